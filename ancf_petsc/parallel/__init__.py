@@ -1,0 +1,1 @@
+"""Who owns what: slabs, partition, numbering, exchange between ranks."""
