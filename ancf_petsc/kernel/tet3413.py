@@ -180,7 +180,7 @@ def make_kernels(law: Law) -> Kernels:
             scatter_force(force, nodes, dP, volumes[e], G)
 
     @kernel
-    def fields(positions, cells, gradients, parameters, first, last, strain, cauchy, det):
+    def fields(positions, cells, gradients, volumes, parameters, first, last, strain, cauchy, det):
         """Green-Lagrange strain (e, 9), Cauchy stress (e, 9) and det F (e,) of the cells."""
         for e in range(first, last):
             F = edge_sum(positions, cells[e], gradients[e])

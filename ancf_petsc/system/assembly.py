@@ -1,0 +1,225 @@
+"""Forces and tangents of a model in PETSc's vectors and matrices.
+
+Rows are complete where they are owned, so only ghost positions travel. The tangent is written straight into the arrays of
+the matrix, with rows and columns of driven degrees of freedom left out and one number on their diagonal.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ancf_petsc.kernel.graph import block_starts, neighbours
+from ancf_petsc.system.model import Model
+
+
+class Assembly:
+    """Evaluates a model at states x, PETSc vectors of the owned nodal vectors."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.comm = model.comm
+        self.tangent_evaluations = 0
+        n = model.owned
+        self._positions = model.reference.copy()
+        self._force = np.zeros_like(model.reference)
+        self._driven_bits = model.driven_bits()
+        self.driven = np.flatnonzero(model.motion[:n] >= 0)
+        self.driven_motion = model.motion[:n].ravel()[self.driven]
+        self._ghosts = self._ghost_scatter()
+
+    # --- vectors
+
+    def vector(self) -> PETSc.Vec:
+        """A new vector of the owned nodal vectors, zero."""
+        return PETSc.Vec().createMPI((3 * self.model.owned, None), bsize=3, comm=self.comm)
+
+    def reference_vector(self) -> PETSc.Vec:
+        """The undeformed state."""
+        x = self.vector()
+        x.array[:] = self.model.reference[: self.model.owned].ravel()
+        return x
+
+    def local(self, x: PETSc.Vec, into: NDArray | None = None) -> NDArray:
+        """Values (v, 3) of x at owned nodal vectors and ghosts; valid until the next call with the same `into`."""
+        values = self._positions if into is None else into
+        values[: self.model.owned] = x.array_r.reshape(-1, 3)
+        if self._ghosts is not None:
+            scatter, ghosts = self._ghosts
+            scatter.scatter(x, ghosts, addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+            values[self.model.owned :] = ghosts.array_r.reshape(-1, 3)
+        return values
+
+    def set_driven(self, x: PETSc.Vec, s: float) -> None:
+        """Put the driven degrees of freedom of x where they belong at pseudo-time s."""
+        values = np.array([motion.value(s) for motion in self.model.motions] or [0.0])
+        owned = self.model.reference[: self.model.owned].ravel()
+        x.array[self.driven] = owned[self.driven] + values[self.driven_motion]
+
+    def external_force(self, s: float) -> NDArray:
+        """Dead loads on the owned nodal vectors (n, 3) at pseudo-time s."""
+        total = np.zeros((self.model.owned, 3))
+        for load in self.model.loads:
+            total += load.ramp.value(s) * load.pattern
+        return total
+
+    # --- forces and energies
+
+    def internal_force(self, x: PETSc.Vec) -> tuple[NDArray, float]:
+        """Q (n, 3) of the owned nodal vectors, valid until the next call, and the smallest det F of this rank's cells."""
+        positions, force = self.local(x), self._force
+        force[:] = 0.0
+        smallest = np.inf
+        for region in self.model.regions:
+            found = region.kernels.internal_force(
+                positions, *self.model.tables, region.parameters, region.first, region.last, force
+            )
+            smallest = min(smallest, found)
+        return force[: self.model.owned], smallest
+
+    def smallest_det(self, x: PETSc.Vec) -> float:
+        """Smallest det F over all cells."""
+        return self.comm.allreduce(self.internal_force(x)[1], MPI.MIN)
+
+    def strain_energy(self, x: PETSc.Vec) -> float:
+        """Strain energy of the whole body."""
+        positions = self.local(x)
+        own = [
+            region.kernels.energy(
+                positions, *self.model.tables, region.parameters, region.first, region.own_last
+            )
+            for region in self.model.regions
+        ]
+        return self.comm.allreduce(sum(own))
+
+    def tangent_product(self, x: PETSc.Vec, direction: PETSc.Vec) -> NDArray:
+        """The tangent at x times a direction: (n, 3) on owned nodal vectors, driven rows and columns included."""
+        positions = self.local(x)
+        along = self.local(direction, into=np.empty_like(positions))
+        force = np.zeros_like(positions)
+        for region in self.model.regions:
+            region.kernels.tangent_product(
+                positions, along, *self.model.tables, region.parameters, region.first, region.last, force
+            )
+        return force[: self.model.owned]
+
+    def fields(self, x: PETSc.Vec) -> tuple[NDArray, NDArray, NDArray]:
+        """Green-Lagrange strain (e, 9), Cauchy stress (e, 9) and det F (e,) of this rank's cells."""
+        positions, e = self.local(x), len(self.model.cells)
+        strain, cauchy, det = np.empty((e, 9)), np.empty((e, 9)), np.empty(e)
+        for region in self.model.regions:
+            region.kernels.fields(
+                positions,
+                *self.model.tables,
+                region.parameters,
+                region.first,
+                region.last,
+                strain,
+                cauchy,
+                det,
+            )
+        return strain, cauchy, det
+
+    # --- the matrix
+
+    def create_matrix(self) -> PETSc.Mat:
+        """A matrix that shares its arrays with `tangent`; zero, all blocks of cells present."""
+        n = self.model.owned
+        pointers, columns = neighbours(self.model.cells, len(self.model.reference), n)
+        rows = np.repeat(np.arange(n), np.diff(pointers))
+        own = columns < n
+        parts = []
+        for inside in (own, ~own):
+            counts = np.bincount(rows[inside], minlength=n)
+            parts.append((np.concatenate(([0], np.cumsum(counts))), columns[inside]))
+        (own_pointers, own_columns), (other_pointers, other_columns) = parts
+        self._starts = block_starts(
+            self.model.cells, n, own_pointers, own_columns, other_pointers, other_columns, 3
+        )
+        self._strides = np.zeros((len(self.model.reference), 2), np.int32)
+        self._strides[:n, 0], self._strides[:n, 1] = 3 * np.diff(own_pointers), 3 * np.diff(other_pointers)
+        self._split = 9 * len(own_columns)
+        self._values = np.zeros(9 * len(columns))
+        self._diagonal = self._diagonal_places(own_pointers, own_columns)
+        matrix = self._share(own_pointers, own_columns, other_pointers, other_columns)
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        matrix.setOption(PETSc.Mat.Option.SYMMETRY_ETERNAL, True)
+        return matrix
+
+    def tangent(self, x: PETSc.Vec, matrix: PETSc.Mat) -> None:
+        """Fill the matrix with the tangent at x."""
+        self.tangent_evaluations += 1
+        positions, values = self.local(x), self._values
+        values[:] = 0.0
+        for region in self.model.regions:
+            region.kernels.tangent(
+                positions,
+                *self.model.tables,
+                region.parameters,
+                region.first,
+                region.last,
+                self._starts,
+                self._strides,
+                self._split,
+                self._driven_bits,
+                values,
+            )
+        diagonal = values[self._diagonal]
+        free = np.ones(len(diagonal), bool)
+        free[self.driven] = False
+        total, count, largest = diagonal[free].sum(), free.sum(), np.abs(diagonal[free]).max(initial=0.0)
+        total, count = self.comm.allreduce(np.array([total, count]))
+        self.largest_diagonal = self.comm.allreduce(largest, MPI.MAX)
+        values[self._diagonal[self.driven]] = (
+            total / count if count and total > 0.0 else self.largest_diagonal or 1.0
+        )
+        matrix.stateIncrease()
+        matrix.assemble()
+
+    def _share(self, own_pointers, own_columns, other_pointers, other_columns) -> PETSc.Mat:
+        """PETSc's matrix on this object's array of values."""
+        n, total = 3 * self.model.owned, self.comm.allreduce(3 * self.model.owned)
+        own = (*_scalar_rows(own_pointers, own_columns), self._values[: self._split])
+        sizes = ((n, total), (n, total))
+        if self.comm.size == 1:
+            return PETSc.Mat().createAIJWithArrays(sizes, own, bsize=3, comm=self.comm)
+        numbers = self.model.ghost_numbers[other_columns - self.model.owned]
+        other = (*_scalar_rows(other_pointers, numbers), self._values[self._split :])
+        return PETSc.Mat().createAIJWithArrays(sizes, (own, other), bsize=3, comm=self.comm)
+
+    def _diagonal_places(self, pointers: NDArray, columns: NDArray) -> NDArray[np.int64]:
+        """Where the diagonal of each owned degree of freedom lies in the values."""
+        n = self.model.owned
+        counts = np.diff(pointers)
+        rows = np.repeat(np.arange(n), counts)
+        slot = np.flatnonzero(columns == rows) - pointers[:-1]
+        component = np.arange(3)
+        start = 9 * pointers[:-1] + 3 * slot
+        return (start[:, None] + component * (3 * counts[:, None] + 1)).ravel()
+
+    def _ghost_scatter(self):
+        """PETSc's scatter to the ghosts and the vector it fills; None on one rank."""
+        if self.comm.size == 1:
+            return None
+        numbers = self.model.ghost_numbers.astype(PETSc.IntType)
+        ghosts = PETSc.Vec().createSeq(3 * len(numbers), bsize=3, comm=PETSc.COMM_SELF)
+        source = PETSc.IS().createBlock(3, numbers, comm=PETSc.COMM_SELF)
+        x = self.vector()
+        scatter = PETSc.Scatter().create(x, source, ghosts, None)
+        x.destroy()
+        return scatter, ghosts
+
+
+def _scalar_rows(pointers: NDArray, columns: NDArray) -> tuple[NDArray, NDArray]:
+    """Pointers and columns of the scalar rows of a matrix of 3 x 3 blocks, in PETSc's integers."""
+    counts = np.diff(pointers)
+    scalar_pointers = np.concatenate(([0], np.cumsum(np.repeat(3 * counts, 3))))
+    scalar = (3 * columns[:, None].astype(np.int64) + np.arange(3)).ravel()
+    starts = np.repeat(3 * pointers[:-1], 3)
+    lengths = np.repeat(3 * counts, 3)
+    within = np.arange(scalar_pointers[-1]) - np.repeat(scalar_pointers[:-1], lengths)
+    return scalar_pointers.astype(PETSc.IntType), scalar[np.repeat(starts, lengths) + within].astype(
+        PETSc.IntType
+    )

@@ -1,0 +1,80 @@
+"""Rigid motions that the supports leave free, piece by piece of the mesh, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+AXES = ("x", "y", "z")
+
+
+def free_motions(points: NDArray, driven: NDArray, piece: NDArray, pieces: int) -> dict[int, list[str]]:
+    """Names of the free rigid motions of each piece that has some.
+
+    points (n, 3), driven (n, 3) bool, piece (n,) label of each node, -1 for nodes of no cell.
+    A motion is free if it moves no driven degree of freedom: the null space of the 6 x 6 Gram matrix of the motions at the
+    driven degrees of freedom. Rotations are scaled by the size of the piece.
+    """
+    found = {}
+    for label, gram, centre, size in _gram_matrices(points, driven, piece, pieces):
+        values, vectors = np.linalg.eigh(gram)
+        null = vectors[:, values <= 1e-12 * max(np.trace(gram), 1e-300)]
+        if null.shape[1]:
+            found[label] = _names(null, centre, size)
+    return found
+
+
+def _gram_matrices(points, driven, piece, pieces):
+    """Label, Gram matrix, centre and size of each piece."""
+    used = piece >= 0
+    count = np.bincount(piece[used], minlength=pieces)
+    centre = (
+        np.stack([np.bincount(piece[used], points[used, i], pieces) for i in range(3)], 1) / count[:, None]
+    )
+    arm = np.zeros_like(points)
+    arm[used] = points[used] - centre[piece[used]]
+    size = np.sqrt(np.bincount(piece[used], (arm[used] ** 2).sum(axis=1), pieces) / count)
+    grams = np.zeros((pieces, 6, 6))
+    for i in range(3):
+        rows = np.flatnonzero(driven[:, i] & used)
+        modes = np.zeros((len(rows), 6))
+        modes[:, i] = 1.0
+        scaled = arm[rows] / size[piece[rows], None]
+        j, k = (i + 1) % 3, (i + 2) % 3
+        modes[:, 3 + j], modes[:, 3 + k] = scaled[:, k], -scaled[:, j]
+        np.add.at(grams, piece[rows], modes[:, :, None] * modes[:, None, :])
+    return [(label, grams[label], centre[label], size[label]) for label in range(pieces)]
+
+
+def _names(null: NDArray, centre: NDArray, size: float) -> list[str]:
+    """Translations first, then rotations with a point of their axis. null (6, k)."""
+    _, singular, basis = np.linalg.svd(null[3:])
+    rank = int((singular > 1e-6).sum())
+    translations = null[:3] @ basis[rank:].T
+    names = [f"translation along {d}" for d in _directions(translations)]
+    if rank == 3:
+        return [*names, *(f"rotation about {axis}" for axis in AXES)]
+    for mode in (null @ basis[:rank].T).T:
+        axis = mode[3:] / np.linalg.norm(mode[3:])
+        point = centre + np.cross(axis, mode[:3]) * size / np.linalg.norm(mode[3:])
+        place = ", ".join(f"{c:.6g}" for c in point)
+        names.append(f"rotation about the axis along {_direction(axis)} through ({place})")
+    return names
+
+
+def _directions(vectors: NDArray) -> list[str]:
+    """Words for the space spanned by unit columns (3, k): the axes where they span it."""
+    if vectors.shape[1] == 0:
+        return []
+    inside = [axis for i, axis in enumerate(AXES) if abs(np.linalg.norm(vectors[i]) - 1.0) < 1e-6]
+    if len(inside) == vectors.shape[1]:
+        return inside
+    return [_direction(column) for column in vectors.T]
+
+
+def _direction(vector: NDArray) -> str:
+    largest = int(np.argmax(np.abs(vector)))
+    if abs(abs(vector[largest]) - 1.0) < 1e-6:
+        return AXES[largest]
+    vector = vector * np.sign(vector[largest])
+    return "(" + ", ".join(f"{c:.3f}" for c in vector) + ")"

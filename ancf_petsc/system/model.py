@@ -1,0 +1,86 @@
+"""The discrete body on this rank: nodal vectors, cells, laws, supports and loads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ancf_petsc.material import Law
+from ancf_petsc.parallel.exchange import lookup, scatter_rows
+from ancf_petsc.parallel.numbering import Numbering
+from ancf_petsc.parallel.slabs import slab_bounds
+from ancf_petsc.system.constraint import Motion
+from ancf_petsc.system.load import Load
+
+
+@dataclass(frozen=True)
+class Region:
+    """Cells first:last of one material; those before own_last are owned by this rank.
+
+    kernels: compiled loops for the element and the law.
+    """
+
+    law: Law
+    kernels: object
+    parameters: NDArray[np.float64]
+    density: float | None
+    first: int
+    own_last: int
+    last: int
+
+
+@dataclass
+class Model:
+    """What a solver needs to know of the body. v local nodal vectors (owned first), e local cells.
+
+    reference (v, 3): nodal vectors of the undeformed body.
+    tables: arrays of the cells that every kernel takes: cells (e, a), gradients, volumes.
+    motion (v, 3): index into motions of driven degrees of freedom, -1 where free.
+    size: diagonal of the box around the body.
+    groups: name -> owned nodal vectors of its nodes (positions).
+    means: name -> (owned nodal vectors, weights): weighted means of positions over all ranks.
+    """
+
+    comm: MPI.Comm
+    numbering: Numbering
+    owned: int
+    start: int
+    ghost_numbers: NDArray[np.int64]
+    reference: NDArray[np.float64]
+    tables: tuple[NDArray, ...]
+    regions: list[Region]
+    motion: NDArray[np.int32]
+    motions: list[Motion]
+    size: float
+    loads: list[Load] = field(default_factory=list)
+    groups: dict[str, NDArray[np.int64]] = field(default_factory=dict)
+    means: dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]] = field(default_factory=dict)
+
+    @property
+    def cells(self) -> NDArray[np.int32]:
+        """(e, a) local nodal vectors of each cell."""
+        return self.tables[0]
+
+    @property
+    def volumes(self) -> NDArray[np.float64]:
+        """(e,) undeformed volumes."""
+        return self.tables[2]
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom over all ranks, driven ones included."""
+        return self.comm.allreduce(3 * self.owned)
+
+    def driven_bits(self) -> NDArray[np.uint8]:
+        """(v,) bit i is set where component i of the nodal vector is driven."""
+        return ((self.motion >= 0) << np.arange(3)).sum(axis=1).astype(np.uint8)
+
+
+def local_rows(numbering: Numbering, table: NDArray | None, total: int) -> NDArray:
+    """Rows of a table over all nodes, which the root rank holds, for the local nodes of this rank. Collective."""
+    slab = scatter_rows(numbering.comm, table)
+    bounds = slab_bounds(total, numbering.comm.size)
+    return lookup(numbering.comm, bounds, slab, numbering.file_nodes)
