@@ -1,0 +1,1 @@
+"""Curves, figures and pictures of a run; none of it knows MPI or PETSc."""

@@ -1,0 +1,153 @@
+"""Read what a run left: curves and fields as numpy arrays, without MPI."""
+
+from __future__ import annotations
+
+import json
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ancf_petsc.errors import CaseError, did_you_mean
+from ancf_petsc.results.tables import read_table
+from ancf_petsc.results.xdmf import CELL_KINDS, field_name, link_name
+
+if TYPE_CHECKING:
+    import pyvista
+
+Array = NDArray[Any]
+Columns = dict[str, NDArray[np.float64]]
+
+
+def open_results(folder: str | Path) -> Results:
+    """The run in a folder, finished or still going on; CaseError where there is none."""
+    return Results(Path(folder))
+
+
+class Results:
+    """A run. Everything but the names is read when it is asked for.
+
+    title, units, note, kind: as the case and the mesh have them; kind is meshio's name of the cells.
+    times: (steps,) pseudo-time of statics, time of motion, one an output.
+    fields: names of what every step holds, over nodes or over cells.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.path = folder / "results.h5"
+        if not self.path.is_file():
+            raise CaseError("no results here", file=folder, expected="a folder that `ancf run` has written")
+        try:
+            with self._open() as file:
+                self._read_names(file)
+        except (OSError, KeyError) as error:
+            raise CaseError(
+                f"cannot be read: {error}",
+                file=self.path,
+                cure="the run may have been killed while it wrote: run again",
+            ) from error
+
+    def _open(self) -> h5py.File:
+        return h5py.File(self.path, "r", locking=False)
+
+    def _read_names(self, file: h5py.File) -> None:
+        self.title = str(file.attrs["title"])
+        self.units = str(file.attrs["units"])
+        self.note = str(file.attrs.get("note", ""))
+        self.kind = str(file["mesh"].attrs["kind"])
+        steps = file["steps"]
+        self._steps = sorted(steps, key=int)
+        self.times = np.array([steps[name].attrs["time"] for name in self._steps], float)
+        self.extras = [dict(steps[name].attrs) for name in self._steps]
+        self.fields = tuple(field_name(link) for link in steps[self._steps[0]]) if self._steps else ()
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """summary.json; empty while the run goes on."""
+        path = self.folder / "summary.json"
+        if not path.is_file():
+            return {}
+        try:
+            return dict(json.loads(path.read_text(encoding="utf-8")))
+        except ValueError as error:
+            raise CaseError(f"cannot be read: {error}", file=path) from error
+
+    @cached_property
+    def curve(self) -> Columns:
+        """Columns (rows,) of curve.csv by name."""
+        return read_table(self.folder / "curve.csv")
+
+    @cached_property
+    def probes(self) -> Columns:
+        """Columns (rows,) of probes.csv by name; empty where the case has no probe."""
+        path = self.folder / "probes.csv"
+        return read_table(path) if path.is_file() else {}
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """(n, 3) undeformed."""
+        return self._dataset("mesh/points")
+
+    @cached_property
+    def cells(self) -> NDArray[np.int64]:
+        """(e, k) indices of points."""
+        return self._dataset("mesh/cells")
+
+    @cached_property
+    def node_numbers(self) -> NDArray[np.int64]:
+        """(n,) numbers in the mesh file."""
+        return self._dataset("mesh/node_numbers")
+
+    @cached_property
+    def cell_numbers(self) -> NDArray[np.int64]:
+        """(e,) numbers in the mesh file."""
+        return self._dataset("mesh/cell_numbers")
+
+    @cached_property
+    def groups(self) -> dict[str, NDArray[np.int64]]:
+        """name -> (m,) indices of points."""
+        with self._open() as file:
+            return {field_name(link): nodes[()] for link, nodes in file["mesh/groups"].items()}
+
+    def field(self, name: str, step: int = -1) -> Array:
+        """Values (n, ...) over nodes or (e, ...) over cells at a step, counted from 0 or from the end."""
+        if name not in self.fields:
+            raise CaseError("no such field", file=self.path, got=name, cure=did_you_mean(name, self.fields))
+        return self._dataset(f"steps/{self._steps[self._index(step)]}/{link_name(name)}")
+
+    def is_nodal(self, name: str) -> bool:
+        """Whether a field lives on nodes rather than on cells."""
+        with self._open() as file:
+            return file["steps"][self._steps[0]][link_name(name)].attrs["centre"] == "Node"
+
+    def step_at(self, time: float) -> int:
+        """The step nearest to a time."""
+        return int(np.argmin(np.abs(self.times - time)))
+
+    def mesh(self, step: int = -1, *, scale: float = 1.0) -> pyvista.UnstructuredGrid:
+        """The body at a step as pyvista sees it, displacements times `scale` (0: undeformed), with all fields."""
+        import pyvista
+
+        count, nodes = self.cells.shape
+        connectivity = np.hstack([np.full((count, 1), nodes), self.cells])
+        points = self.points + scale * self.field("displacement", step)
+        grid = pyvista.UnstructuredGrid(connectivity, np.full(count, CELL_KINDS[self.kind].vtk), points)
+        for name in self.fields:
+            data = grid.point_data if self.is_nodal(name) else grid.cell_data
+            data[name] = self.field(name, step)
+        return grid
+
+    def _index(self, step: int) -> int:
+        count = len(self._steps)
+        if not -count <= step < count:
+            raise CaseError(
+                "no such step", file=self.path, got=step, expected=f"0 to {count - 1}, or -1 for the last"
+            )
+        return step % count
+
+    def _dataset(self, path: str) -> Array:
+        with self._open() as file:
+            return file[path][()]

@@ -1,0 +1,80 @@
+"""CSV tables that grow by a whole line at a time and give every number back exactly."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ancf_petsc.errors import CaseError
+
+
+class Table:
+    """Writer of a CSV file; every row is on disk when `append` returns."""
+
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+        self.path = Path(path)
+        self.columns = tuple(columns)
+        if len(set(self.columns)) != len(self.columns):
+            raise ValueError(f"{self.path}: a column is named twice: {self.columns}")
+        self._file = self.path.open("wb", buffering=0)  # unbuffered: one line, one write
+        self._write(self.columns)
+
+    def append(self, row: Mapping[str, float] | Sequence[float]) -> None:
+        """One row: values by column name, or in the order of the columns."""
+        if isinstance(row, Mapping):
+            if row.keys() != set(self.columns):
+                raise ValueError(
+                    f"{self.path}: columns {sorted(row.keys() ^ set(self.columns))} do not match"
+                )
+            row = [row[name] for name in self.columns]
+        if len(row) != len(self.columns):
+            raise ValueError(f"{self.path}: {len(row)} values for {len(self.columns)} columns")
+        self._write([_exact(value) for value in row])
+
+    def close(self) -> None:
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _write(self, words: Sequence[str]) -> None:
+        line = io.StringIO()
+        csv.writer(line, lineterminator="\n").writerow(words)
+        self._file.write(line.getvalue().encode())
+
+
+def _exact(value: float) -> str:
+    """Whole numbers as they are; others in 17 significant digits at most, as many as give them back exactly."""
+    if isinstance(value, int | np.integer):
+        return str(int(value))
+    return repr(float(value))
+
+
+def read_table(path: Path) -> dict[str, NDArray[np.float64]]:
+    """Columns (rows,) by name, in the file's order. A last line cut short by a crash is left out."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise CaseError(f"cannot be read: {error.strerror}", file=path) from error
+    header, _, body = text[: text.rfind("\n") + 1].partition("\n")
+    names = next(csv.reader([header]), [])
+    if not body:
+        return {name: np.empty(0) for name in names}
+    try:
+        values = np.loadtxt(io.StringIO(body), delimiter=",", ndmin=2)
+    except ValueError as error:
+        raise CaseError(f"no table of numbers: {error}", file=path) from error
+    if values.shape[1] != len(names):
+        raise CaseError(
+            file=path, got=f"{values.shape[1]} columns", expected=f"{len(names)}, as in its first line"
+        )
+    return dict(zip(names, values.T.copy(), strict=True))
