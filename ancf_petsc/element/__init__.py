@@ -1,0 +1,1 @@
+"""Elements in absolute nodal coordinates: codes, shape functions, quadrature and the catalogue."""
