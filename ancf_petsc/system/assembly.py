@@ -22,6 +22,7 @@ class Assembly:
         self.model = model
         self.comm = model.comm
         self.tangent_evaluations = 0
+        self.largest_diagonal = 0.0
         n = model.owned
         self._positions = model.reference.copy()
         self._force = np.zeros_like(model.reference)

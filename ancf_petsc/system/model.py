@@ -40,6 +40,7 @@ class Model:
     tables: arrays of the cells that every kernel takes: cells (e, a), gradients, volumes.
     motion (v, 3): index into motions of driven degrees of freedom, -1 where free.
     size: diagonal of the box around the body.
+    cell_numbers: (e,) number of each cell in the mesh file.
     groups: name -> owned nodal vectors of its nodes (positions).
     means: name -> (owned nodal vectors, weights): weighted means of positions over all ranks.
     """
@@ -55,6 +56,7 @@ class Model:
     motion: NDArray[np.int32]
     motions: list[Motion]
     size: float
+    cell_numbers: NDArray[np.int64]
     loads: list[Load] = field(default_factory=list)
     groups: dict[str, NDArray[np.int64]] = field(default_factory=dict)
     means: dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]] = field(default_factory=dict)

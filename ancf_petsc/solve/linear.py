@@ -1,0 +1,89 @@
+"""Linear solvers for the tangent, chosen by size; the options have the last word.
+
+Up to DIRECT_LIMIT degrees of freedom MUMPS factors the symmetric tangent (LDLᵀ: it may be indefinite, and its negative pivots
+are counted). Above, conjugate gradients with algebraic multigrid that knows the rigid motions of the current configuration.
+"""
+
+from __future__ import annotations
+
+from petsc4py import PETSc
+
+from ancf_petsc.system.assembly import Assembly
+
+DIRECT_LIMIT = 25_000
+
+
+class LinearSolver:
+    """Sets up a KSP for the tangents of one assembly."""
+
+    def __init__(self, assembly: Assembly, ksp: PETSc.KSP) -> None:
+        self.assembly = assembly
+        self.ksp = ksp
+        self.dof = assembly.model.dof
+        self.direct = self.dof <= DIRECT_LIMIT
+        self._configure()
+
+    def _configure(self) -> None:
+        pc = self.ksp.getPC()
+        if self.direct:
+            self.ksp.setType(PETSc.KSP.Type.PREONLY)
+            pc.setType(PETSc.PC.Type.CHOLESKY)
+            pc.setFactorSolverType("mumps")
+        else:
+            self.ksp.setType(PETSc.KSP.Type.CG)
+            self.ksp.setTolerances(rtol=1e-8, max_it=500)
+            pc.setType(PETSc.PC.Type.GAMG)
+            pc.setGAMGType("agg")
+            pc.setGAMGSmooths(1)
+            pc.setReusePreconditioner(False)
+
+    def fall_back_to_direct(self) -> None:
+        """Factor from now on: for tangents that conjugate gradients cannot solve."""
+        self.ksp.reset()
+        self.direct = True
+        self._configure()
+        self.ksp.setFromOptions()
+
+    def describe(self) -> str:
+        """The solver in words, as it is after the options were read."""
+        pc = self.ksp.getPC()
+        package = pc.getFactorSolverType() if pc.getType() in ("cholesky", "lu") else None
+        names = [self.ksp.getType(), pc.getType()] + ([package] if package else [])
+        return f"{' + '.join(names)}, {self.dof} degrees of freedom"
+
+    def know_rigid_motions(self, matrix: PETSc.Mat, x: PETSc.Vec) -> None:
+        """Give multigrid the rigid motions of the state x, zero at driven degrees of freedom."""
+        if self.ksp.getPC().getType() not in ("gamg", "hypre", "ml", "bddc"):
+            return
+        rigid = PETSc.NullSpace().createRigidBody(x)
+        matrix.setNearNullSpace(rigid)
+        rigid.destroy()
+
+    def negative_pivots(self) -> int | None:
+        """How many negative pivots the last factorisation met; None if there was none by MUMPS."""
+        pc = self.ksp.getPC()
+        if pc.getType() != "cholesky" or pc.getFactorSolverType() != "mumps":
+            return None
+        return int(pc.getFactorMatrix().getMumpsInfog(12))
+
+    def gave_up(self) -> bool:
+        """Whether an iterative method failed where a factorisation would go on."""
+        return not self.direct and self.ksp.getConvergedReason() < 0
+
+
+def negative_pivots_of(matrix: PETSc.Mat) -> int | None:
+    """Negative pivots of a symmetric matrix by a factorisation made for this answer; None if it fails."""
+    ksp = PETSc.KSP().create(matrix.comm)
+    ksp.setOperators(matrix)
+    ksp.setType(PETSc.KSP.Type.PREONLY)
+    pc = ksp.getPC()
+    pc.setType(PETSc.PC.Type.CHOLESKY)
+    pc.setFactorSolverType("mumps")
+    try:
+        pc.setUp()
+        failed = pc.getFailedReason() != 0
+        return None if failed else int(pc.getFactorMatrix().getMumpsInfog(12))
+    except PETSc.Error:
+        return None
+    finally:
+        ksp.destroy()

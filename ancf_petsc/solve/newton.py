@@ -1,0 +1,145 @@
+"""Equilibrium at one pseudo-time: PETSc's SNES on the free degrees of freedom.
+
+A trial state with det F <= 0 or a non-finite force gives NaN, which the line search answers with a shorter step: such a state
+is never accepted. Convergence: |R| <= tolerance x max(|reactions|, |loads|, rounding floor).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ancf_petsc.solve.linear import LinearSolver
+from ancf_petsc.system.assembly import Assembly
+
+MOST_ITERATIONS = 25
+Reason = PETSc.SNES.ConvergedReason
+WORDS = {
+    Reason.DIVERGED_FNORM_NAN: "the start has det F <= 0 or forces that are not finite",
+    Reason.DIVERGED_MAX_IT: f"no convergence in {MOST_ITERATIONS} iterations",
+    Reason.DIVERGED_LINE_SEARCH: "no step along Newton's direction lowers the out-of-balance force",
+    Reason.DIVERGED_LINEAR_SOLVE: "the linear solver failed",
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one Newton solve did. residuals: out-of-balance force over the force scale, one an iteration."""
+
+    converged: bool
+    reason: str
+    newton: int
+    linear: int
+    residuals: tuple[float, ...]
+
+
+class Newton:
+    """Solves Q(x) = Q_e(s) for the free degrees of freedom, the driven ones being in place."""
+
+    def __init__(self, assembly: Assembly, tolerance: float) -> None:
+        self.assembly = assembly
+        self.comm = assembly.comm
+        self.tolerance = tolerance
+        self.matrix = assembly.create_matrix()
+        self._external = assembly.external_force(0.0)
+        self._residuals: list[float] = []
+        self._supported = (0.0, 0.0)
+        self._snes = self._create()
+        self.linear = LinearSolver(assembly, self._snes.getKSP())
+        self._snes.setFromOptions()
+
+    def _create(self) -> PETSc.SNES:
+        snes = PETSc.SNES().create(self.comm)
+        snes.setType(PETSc.SNES.Type.NEWTONLS)
+        snes.setFunction(self._residual, self.assembly.vector())
+        snes.setJacobian(self._tangent, self.matrix)
+        snes.setConvergenceTest(self._test)
+        snes.setTolerances(max_it=MOST_ITERATIONS)
+        return snes
+
+    def destroy(self) -> None:
+        """Free PETSc's objects."""
+        self._snes.destroy()
+        self.matrix.destroy()
+
+    def set_pseudo_time(self, s: float) -> None:
+        """Loads as they are at s."""
+        self._external = self.assembly.external_force(s)
+
+    def solve(self, s: float, x: PETSc.Vec) -> Outcome:
+        """Bring x, whose driven degrees of freedom are those of s, to equilibrium. x is garbage if it fails."""
+        self.set_pseudo_time(s)
+        self._residuals = []
+        self._snes.solve(None, x)
+        reason = self._snes.getConvergedReason()
+        return Outcome(
+            converged=reason > 0,
+            reason=WORDS.get(reason, f"PETSc's reason {reason}"),
+            newton=self._snes.getIterationNumber(),
+            linear=self._snes.getLinearSolveIterations(),
+            residuals=tuple(self._residuals),
+        )
+
+    def predict(self, x: PETSc.Vec, s: float, target: float) -> bool:
+        """Move x from equilibrium at s by the tangent to `target`. Returns whether the linear solve succeeded."""
+        assembly = self.assembly
+        increment = assembly.vector()
+        before = x.array_r.copy()
+        assembly.set_driven(x, target)
+        increment.array[:] = x.array_r - before
+        x.array[:] = before
+        rhs = assembly.vector()
+        load = assembly.external_force(target) - assembly.external_force(s)
+        rhs.array[:] = (load - assembly.tangent_product(x, increment)).ravel()
+        rhs.array[assembly.driven] = 0.0
+        self._tangent(self._snes, x, self.matrix, self.matrix)
+        ksp = self.linear.ksp
+        ksp.setOperators(self.matrix)
+        step = assembly.vector()
+        ksp.solve(rhs, step)
+        good = ksp.getConvergedReason() > 0
+        x.axpy(1.0, step)
+        x.axpy(1.0, increment)
+        assembly.set_driven(x, target)
+        for vector in (increment, rhs, step):
+            vector.destroy()
+        return good
+
+    def out_of_balance(self, x: PETSc.Vec):
+        """Q - Q_e (n, 3) on owned nodal vectors at the present pseudo-time: reactions where driven."""
+        force, _ = self.assembly.internal_force(x)
+        return force - self._external
+
+    # --- SNES's callbacks
+
+    def _residual(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+        force, smallest = self.assembly.internal_force(x)
+        values = (force - self._external).ravel()
+        driven = self.assembly.driven
+        reactions, loads = values[driven], self._external.ravel()
+        self._supported = (float(reactions @ reactions), float(loads @ loads))
+        values[driven] = 0.0
+        f.array[:] = values if smallest > 0.0 else np.nan
+
+    def _tangent(self, snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
+        self.assembly.tangent(x, P)
+        self.linear.know_rigid_motions(P, x)
+
+    def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
+        residual = norms[2]
+        if not np.isfinite(residual):
+            return Reason.DIVERGED_FNORM_NAN
+        scale = self._force_scale()
+        self._residuals.append(residual / scale if scale else 0.0)
+        if residual <= self.tolerance * scale or residual == 0.0:
+            return Reason.CONVERGED_FNORM_RELATIVE
+        return Reason.ITERATING
+
+    def _force_scale(self) -> float:
+        """The largest of the norms of reactions and loads, and what rounding leaves of the tangent times the size."""
+        reactions, loads = np.sqrt(self.comm.allreduce(np.array(self._supported), MPI.SUM))
+        floor = 1e-14 * self.assembly.largest_diagonal * self.assembly.model.size
+        return max(reactions, loads, floor / self.tolerance)

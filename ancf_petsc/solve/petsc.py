@@ -1,0 +1,62 @@
+"""PETSc's options: the one place that reads and writes them.
+
+The options of a case and of the command line have the last word: solvers set their defaults first and call `setFromOptions`
+after. An option that no solver asked for is an error.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from petsc4py import PETSc
+
+from ancf_petsc.errors import CaseError
+
+
+@contextmanager
+def petsc_options(given: Mapping[str, object]) -> Iterator[None]:
+    """Put options into PETSc's database for the time of one run. Collective."""
+    database = PETSc.Options()
+    for name, value in given.items():
+        database.setValue(name, _text(value))
+    try:
+        yield
+    finally:
+        for name in given:
+            database.delValue(name)
+
+
+def unused_options(given: Mapping[str, object]) -> list[str]:
+    """Names of the options that no PETSc object has asked for so far."""
+    return [name for name in given if not _used(name)]
+
+
+def refuse_unused(given: Mapping[str, object]) -> None:
+    """Raise CaseError for options nobody asked for."""
+    unused = unused_options(given)
+    if unused:
+        raise CaseError(
+            "no solver of this run uses it",
+            key=f"petsc.{unused[0]}",
+            got=given[unused[0]],
+            expected="an option of PETSc's SNES, TS, KSP, PC or MatPartitioning in use here",
+            cure="take it out or correct its name" + (f" (and {len(unused) - 1} more)" if unused[1:] else ""),
+        )
+
+
+def _text(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return "" if value is None else str(value)
+
+
+def _used(name: str) -> bool:
+    """Whether PETSc was asked for the option. petsc4py 3.18 has no binding for it, its library does."""
+    if hasattr(PETSc.Options, "used"):
+        return bool(PETSc.Options().used(name))
+    flag = ctypes.c_int(0)
+    library = ctypes.CDLL(PETSc.__file__)
+    library.PetscOptionsUsed(None, name.encode(), ctypes.byref(flag))
+    return bool(flag.value)
