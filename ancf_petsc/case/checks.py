@@ -166,7 +166,7 @@ def _largest(ramp: Ramp) -> float:
 
 
 def _section(spec: CaseSpec) -> Problems:
-    """Solids have no section; plane elements need a thickness and a plane state, beams an area and an inertia."""
+    """Solids have no section; plane elements need thickness and plane state, beams area and inertia."""
     code = spec.mesh.element
     needed = {"1": ("area", "inertia"), "2": ("thickness", "plane")}.get(code[0], ())
     section = spec.section

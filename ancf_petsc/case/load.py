@@ -23,8 +23,9 @@ CASE_FILE = "case.toml"
 class Case:
     """A case that has been checked.
 
-    spec: what it says. file: where it was read, None for one made in a script. folder: what its file names refer to.
-    name: the folder's name for NAME/case.toml, else the file's. text: the case as TOML, changes included.
+    spec: what it says. file: where it was read, None for one made in a script. folder: what its file
+    names refer to. name: the folder's name for NAME/case.toml, else the file's. text: the case as TOML,
+    changes included.
     """
 
     spec: CaseSpec
@@ -38,7 +39,10 @@ class Case:
         return (self.folder / self.spec.mesh.file).resolve()
 
     def with_changes(self, changes: Mapping[str, Any]) -> Case:
-        """The case with other values at dotted paths, such as {"material.law": "neo_hooke"}; None takes a key away."""
+        """The case with other values at dotted paths, such as {"material.law": "neo_hooke"}.
+
+        None takes a key away. Raises CaseError.
+        """
         data = toml.parse(self.text)
         for path, value in changes.items():
             way, rest = split_path(path)
@@ -53,8 +57,8 @@ class Case:
 def load_case(path: str | Path, overrides: Sequence[str] = (), petsc_options: Sequence[str] = ()) -> Case:
     """Read and check a case: a TOML file or a folder with case.toml.
 
-    overrides: texts `key=value` as --set takes them. petsc_options: words such as ["-ksp_type", "cg"], stronger than
-    the file's. Raises CaseError.
+    overrides: texts `key=value` as --set takes them. petsc_options: words such as ["-ksp_type", "cg"],
+    stronger than the file's. Raises CaseError.
     """
     file = _case_file(Path(path))
     data = toml.read(file)

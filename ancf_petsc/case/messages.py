@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from json import dumps
 from pathlib import Path
 from reprlib import Repr
-from types import UnionType
+from types import NoneType, UnionType
 from typing import Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from ancf_petsc.case.schema import CaseSpec
+from ancf_petsc.case.types import AXES
 from ancf_petsc.errors import CaseError, did_you_mean
 
 BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -25,7 +26,7 @@ Way = tuple[str | int, ...]
 
 
 class Place(NamedTuple):
-    """Where in the case a problem is: the way to it, the value there, the key's description, the table around it."""
+    """Where in the case a problem is: the way to it, the value there, the key's field and its table."""
 
     way: Way
     value: Any
@@ -36,7 +37,7 @@ class Place(NamedTuple):
 def case_error(
     error: ValidationError, data: dict[str, Any], source: dict[str, Any], file: str | Path | None
 ) -> CaseError:
-    """The first problem of `error` as a CaseError; misspelt keys come first, for what is missing is then clear.
+    """The first problem of `error` as a CaseError; misspelt keys first: they explain what is missing.
 
     data: the case as pydantic saw it, lists as tuples; source: the same, a lone [material] not in an array.
     """
@@ -65,41 +66,38 @@ def _translate(
     detail: Mapping[str, Any], data: dict[str, Any], source: dict[str, Any], file: str | Path | None
 ) -> CaseError:
     kind, context = detail["type"], detail.get("ctx", {})
-    own = kind == "problem"
-    place = _place((*detail["loc"], *(context["at"] if own else ())), data)
-    expected, _, cure = ((place.field.description if place.field else "") or "").partition("; ")
-    what, got = "", place.value
-    if own:
-        what, got = context["what"], context["got"]
+    place = _place((*detail["loc"], *context.get("at", ())), data)
+    way, got = place.way, place.value
+    what, (expected, _, cure) = "", ((place.field and place.field.description) or "").partition("; ")
+    if kind == "problem":
+        what = context["what"]
+        got = context["got"] if what or context["got"] is not None else got
         expected, cure = context["expected"] or expected, context["cure"] or cure
-        if got is None and not what and place.value is not ABSENT:
-            got = place.value
-    elif kind == "extra_forbidden" or "[key]" in detail["loc"]:
-        known = tuple(place.table.model_fields) if kind == "extra_forbidden" else ("x", "y", "z")
-        what, got, expected, cure = "unknown key", None, "", did_you_mean(str(place.way[-1]), known)
-    elif kind in ("union_tag_invalid", "union_tag_not_found"):
-        got, tags = place.value.get("type", ABSENT), ("gravity", "force")
-        place = place._replace(way=(*place.way, "type"))
-        expected, cure = (
-            '"gravity" or "force"',
-            did_you_mean(got, tags) if isinstance(got, str) else f'such as "{tags[0]}"',
-        )
+    elif kind == "extra_forbidden":
+        what, got, expected = "unknown key", None, ""
+        cure = did_you_mean(str(way[-1]), tuple(place.table.model_fields))
+    elif "[key]" in detail["loc"]:
+        what, got, expected, cure = "unknown key", None, f"one of {', '.join(AXES)}", cure
+    elif kind.startswith("union_tag"):
+        way, got = (*way, "type"), got.get("type", ABSENT)
+        expected, cure = '"gravity" or "force"', _nearest(got, ("gravity", "force"))
     elif options := _options_of(place.field):
-        cure = did_you_mean(got, options) if isinstance(got, str) else f"one of {', '.join(options)}"
+        cure = _nearest(got, options)
     if got is ABSENT:
         what, got = what or "missing", None
-    return CaseError(
-        what,
-        file=file,
-        key=written(place.way, source),
-        got=shown(got),
-        expected=expected,
-        cure=cure or FORMAT_PAGE,
-    )
+    key = written(way, source)
+    return CaseError(what, file=file, key=key, got=shown(got), expected=expected, cure=cure or FORMAT_PAGE)
+
+
+def _nearest(got: Any, known: tuple[str, ...]) -> str:
+    return did_you_mean(got, known) if isinstance(got, str) else f"there are: {', '.join(known)}"
 
 
 def _place(loc: Sequence[str | int], data: dict[str, Any]) -> Place:
-    """Follow pydantic's location through the data, leaving out names of union branches; stop inside a key's value."""
+    """Follow pydantic's location through the data, as far as a key whose value is told as a whole.
+
+    Names of union branches, which pydantic mixes in, are left out.
+    """
     way: Way = ()
     value: Any = data
     annotation: Any = CaseSpec
@@ -107,12 +105,9 @@ def _place(loc: Sequence[str | int], data: dict[str, Any]) -> Place:
     table: type[BaseModel] = CaseSpec
     for position, item in enumerate(loc):
         last = position == len(loc) - 1
-        inside = (
-            (item in value)
-            if isinstance(value, dict)
-            else isinstance(value, tuple) and item in range(len(value))
-        )
-        if not inside and not (last and isinstance(value, dict)):
+        table_here = isinstance(value, dict)
+        inside = item in value if table_here else isinstance(value, tuple) and item in range(len(value))
+        if not inside and not (last and table_here):
             continue
         inner = _step(annotation, item, value)
         if inner is None:
@@ -126,46 +121,31 @@ def _place(loc: Sequence[str | int], data: dict[str, Any]) -> Place:
 def _step(
     annotation: Any, item: str | int, value: Any
 ) -> tuple[Any, FieldInfo | None, type[BaseModel] | None] | None:
-    """The annotation one item further, the key's field and its table; None inside a value that is told as a whole."""
-    if hasattr(annotation, "__metadata__"):
-        return _step(annotation.__origin__, item, value)
+    """The annotation one item further, the key's field and its table; None inside a key's value."""
+    annotation = _narrowed(annotation, value)
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         field = annotation.model_fields.get(str(item))
         return (field.annotation if field else None), field, annotation
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is dict:
         return arguments[1], None, None
-    if origin is tuple and list(_tables(arguments[0])):
+    if origin is tuple and isinstance(value[item], dict):
         return arguments[0], None, None
-    if origin in (Union, UnionType):
-        tables = list(_tables(annotation))
-        whole = [table for table in tables if not _is_value(table, arguments)]
-        fits = [
-            t
-            for t in whole
-            if len(whole) == 1 or value.get("type") in get_args(t.model_fields["type"].annotation)
-        ]
-        inner = (
-            fits[0]
-            if fits
-            else next((a for a in arguments if get_origin(a) is tuple and list(_tables(a))), None)
-        )
-        return _step(inner, item, value) if inner is not None else None
     return None
 
 
-def _is_value(table: type[BaseModel], arguments: tuple) -> bool:
-    """Whether a table is only one of several ways to write a value, as in damping = { critical = 1 }."""
-    return any(other is not type(None) and not list(_tables(other)) for other in arguments)
-
-
-def _tables(annotation: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and get_origin(annotation) is None:
-        if issubclass(annotation, BaseModel):
-            yield annotation
-        return
-    for argument in get_args(annotation):
-        yield from _tables(argument)
+def _narrowed(annotation: Any, value: Any) -> Any:
+    """The annotation without None, and of several tables the one that the key `type` names."""
+    if hasattr(annotation, "__metadata__"):
+        return _narrowed(annotation.__origin__, value)
+    if get_origin(annotation) not in (Union, UnionType):
+        return annotation
+    choices = [choice for choice in get_args(annotation) if choice is not NoneType]
+    if len(choices) == 1:
+        return _narrowed(choices[0], value)
+    typed = [choice for choice in choices if "type" in getattr(choice, "model_fields", ())]
+    named = (c for c in typed if value.get("type") in get_args(c.model_fields["type"].annotation))
+    return next(named, None)
 
 
 def _options_of(field: FieldInfo | None) -> tuple[str, ...]:

@@ -54,7 +54,7 @@ def _unquoted(text: str) -> str:
 
 
 def _value(way: tuple[str, ...], text: str) -> Any:
-    """The TOML value of `text`; a word that is none is text, and so is everything for keys that hold codes or names."""
+    """The TOML value of `text`; a word that is none is text, so are numbers where codes or names stand."""
     try:
         tables = tomllib.loads(f"value = {text}")
         value = tables["value"] if len(tables) == 1 else None
@@ -74,8 +74,8 @@ def _value(way: tuple[str, ...], text: str) -> Any:
 def set_value(data: dict[str, Any], way: Sequence[str], value: Any) -> None:
     """Put `value` at the end of `way`; None takes the key away.
 
-    Entries of arrays go by their name or group, or by index from 0. Tables on the way are made when the format knows
-    them. Raises CaseError for a way that leads nowhere.
+    Entries of arrays go by their name or group, or by index from 0. Tables on the way are made when the
+    format knows them. Raises CaseError for a way that leads nowhere.
     """
     place: Any = data
     for depth, name in enumerate(way[:-1]):

@@ -1,15 +1,23 @@
 """The case file, format 1: every table with its keys, defaults and limits. docs/case-format.md is for users.
 
-Each key carries its expectation in words; case/messages.py makes a user's message of it. Checks across tables are in
-case/checks.py.
+Each key carries its expectation in words; case/messages.py makes a user's message of it. Checks across
+tables are in case/checks.py.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from ancf_petsc.case.analysis import (
+    INTEGRATORS,
+    CriticalMode,
+    DynamicsSpec,
+    InitialSpec,
+    Integrator,
+    StaticsSpec,
+)
 from ancf_petsc.case.checks import problems
 from ancf_petsc.case.types import (
     AXES,
@@ -30,28 +38,6 @@ from ancf_petsc.case.types import (
 LAWS = ("svk", "neo_hooke")
 
 
-class Integrator(NamedTuple):
-    """What the case file may ask of an integrator: a tolerance instead of a step, a key of its own."""
-
-    name: str
-    adaptive: bool = False
-    option: str = ""
-
-
-INTEGRATORS = {
-    row.name: row
-    for row in (
-        Integrator("generalized_alpha", option="spectral_radius"),
-        Integrator("energy_momentum"),
-        Integrator("runge_kutta_5dp", adaptive=True),
-        Integrator("runge_kutta_4"),
-        Integrator("rosenbrock", adaptive=True),
-        Integrator("bdf", adaptive=True, option="order"),
-        Integrator("theta", option="theta"),
-    )
-}
-
-
 class MeshSpec(Table):
     """[mesh]: the file, from the case file's folder, and the element."""
 
@@ -66,10 +52,14 @@ class MeshSpec(Table):
 class GroupSpec(Table):
     """[groups] NAME: nodes chosen by geometry. Exactly one of plane, box, nearest, union."""
 
-    plane: Axis | Vector | None = key('an axis "x", "y", "z" or a normal [nx, ny, nz]', None)
-    at: float | Literal["min", "max"] | None = key('a number, "min" or "max"', None)
-    box: tuple[Vector, Vector] | None = key("two corners [[x, y, z], [x, y, z]]", None)
-    nearest: Points | None = key("a point [x, y, z] or a list of points", None)
+    plane: Axis | Vector | None = key(
+        'an axis "x", "y", "z" or a normal [nx, ny, nz]; such as plane = "x"', None
+    )
+    at: float | Literal["min", "max"] | None = key(
+        'a number, "min" or "max"; where the plane cuts its normal', None
+    )
+    box: tuple[Vector, Vector] | None = key("two corners [[x, y, z], [x, y, z]]; lowest first", None)
+    nearest: Points | None = key("a point [x, y, z] or a list of points; such as [0.5, 0.0, 0.1]", None)
     union: tuple[Name, ...] | None = key('a list of group names; such as ["end", "slab"]', None, min_length=1)
 
     @model_validator(mode="after")
@@ -101,9 +91,9 @@ class GroupSpec(Table):
 class MaterialSpec(Table):
     """[material], or one [[material]]: the one without a group takes what the others leave."""
 
-    group: Name | None = key("a group's name", None)
+    group: Name | None = key("a group's name in quotes; of the mesh file or of [groups]", None)
     law: Annotated[str, one_of(LAWS, "a law")] = key('a law; such as law = "svk"')
-    young: float = key("a number > 0; Young's modulus in the unit of stress", gt=0)
+    young: float = key("a number > 0; Young's modulus in the unit of stress, such as young = 6.8e6", gt=0)
     poisson: float = key("a number in (-1, 0.5); take 0.49 for what hardly changes its volume", gt=-1, lt=0.5)
     density: float | None = key("a number > 0; the undeformed mass per volume", None, gt=0)
 
@@ -111,10 +101,10 @@ class MaterialSpec(Table):
 class ConstraintSpec(Table):
     """One [[constraint]]: components held (fix) and driven (move) of a group."""
 
-    group: Name = key("a group's name")
+    group: Name = key("a group's name in quotes; of the mesh file or of [groups]")
     fix: Axes = key('a list out of "x", "y", "z"; such as ["x", "y"]', ())
     move: dict[Axis, float] = key("displacements by axis; such as { z = -0.025 }", {})
-    ramp: RampKey = key("a ramp", "linear")
+    ramp: RampKey = key('a ramp; such as "cosine"', "linear")
 
     @model_validator(mode="after")
     def _check(self) -> ConstraintSpec:
@@ -139,131 +129,19 @@ class GravitySpec(Table):
 
     type: Literal["gravity"]
     acceleration: Vector = key("three numbers; such as [0.0, 0.0, -9.81]")
-    ramp: RampKey = key("a ramp", "linear")
+    ramp: RampKey = key('a ramp; such as "cosine"', "linear")
 
 
 class ForceSpec(Table):
     """One [[load]] of type force: dead, spread over the group by the shape functions."""
 
     type: Literal["force"]
-    group: Name = key("a group's name")
+    group: Name = key("a group's name in quotes; of the mesh file or of [groups]")
     total: Vector = key("three numbers; the whole force on the group, such as [0.0, 0.0, -120.0]")
-    ramp: RampKey = key("a ramp", "linear")
+    ramp: RampKey = key('a ramp; such as "cosine"', "linear")
 
 
 LoadSpec = Annotated[GravitySpec | ForceSpec, Field(discriminator="type")]
-
-
-def _rising(values: tuple[float, ...], name: str) -> None:
-    if any(a >= b for a, b in zip(values, values[1:], strict=False)):
-        raise problem(at=[name], got=values, expected="numbers that rise", cure="sort them, each once")
-
-
-class StaticsSpec(Table):
-    """[statics]: pseudo-time s from 0 to 1. At most one of steps, times, strokes."""
-
-    steps: int | None = key("a whole number >= 1; outputs at s = k/steps", None, ge=1)
-    times: tuple[Annotated[float, Field(gt=0, le=1)], ...] | None = key(
-        "a rising list of numbers in (0, 1]; such as [0.1, 1.0]", None, min_length=1
-    )
-    strokes: tuple[Annotated[float, Field(gt=0)], ...] | None = key(
-        "a rising list of numbers > 0; magnitudes of output.curve.stroke", None, min_length=1
-    )
-    tolerance: float = key("a number in (0, 1); relative, such as 1e-10", 1e-10, gt=0, lt=1)
-    smallest_step: float = key("a number in (0, 1]; of pseudo-time, such as 1e-4", 1e-4, gt=0, le=1)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _default_steps(cls, data: Any) -> Any:
-        choices = ("steps", "times", "strokes")
-        return (
-            {"steps": 25, **data} if isinstance(data, dict) and not any(c in data for c in choices) else data
-        )
-
-    @model_validator(mode="after")
-    def _check(self) -> StaticsSpec:
-        given = [name for name in ("steps", "times", "strokes") if getattr(self, name) is not None]
-        if len(given) > 1:
-            raise problem(
-                f"{' and '.join(given)} given",
-                at=[given[1]],
-                expected="one of steps, times, strokes",
-                cure="drop one",
-            )
-        _rising(self.times or (), "times")
-        _rising(self.strokes or (), "strokes")
-        return self
-
-
-class CriticalMode(Table):
-    """damping = { critical = n }: of the n-th mode (from 1) of the unloaded tangent."""
-
-    critical: int = key("a whole number >= 1", ge=1)
-
-
-class DynamicsSpec(Table):
-    """[dynamics]: motion over `duration`. A step, or a tolerance where the integrator adapts its step."""
-
-    duration: float = key("a number > 0; in the unit of time", gt=0)
-    integrator: Annotated[str, one_of(tuple(INTEGRATORS), "an integrator")] = key(
-        'an integrator; such as "generalized_alpha"', "generalized_alpha"
-    )
-    step: float | None = key("a number > 0; in the unit of time", None, gt=0)
-    tolerance: float | None = key("a number in (0, 1); relative, such as 1e-7", None, gt=0, lt=1)
-    spectral_radius: float = key("a number in [0, 1]; such as 0.8", 0.8, ge=0, le=1)
-    theta: float = key("a number in [0.5, 1]; 0.5 is the trapezoidal rule", 0.5, ge=0.5, le=1)
-    order: int = key("1 or 2; orders above 2 are unstable for undamped structures", 2, ge=1, le=2)
-    mass: Literal["consistent", "lumped"] = key("a kind of mass matrix", "consistent")
-    damping: Annotated[float, Field(ge=0)] | Literal["critical"] | CriticalMode = key(
-        'a number >= 0, "critical" or { critical = n }; in 1 / unit of time', 0.0
-    )
-    outputs: int = key("a whole number >= 1; of equal intervals", 100, ge=1)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _default_tolerance(cls, data: Any) -> Any:
-        asks = isinstance(data, dict) and data.get("integrator") == "runge_kutta_5dp"
-        return {"tolerance": 1e-7, **data} if asks and not {"step", "tolerance"} & data.keys() else data
-
-    @model_validator(mode="after")
-    def _check(self) -> DynamicsSpec:
-        name = self.integrator
-        if self.step is not None and self.tolerance is not None:
-            raise problem(
-                "step and tolerance given",
-                at=["tolerance"],
-                got=self.tolerance,
-                expected="one of them",
-                cure="drop one",
-            )
-        if self.tolerance is not None and not INTEGRATORS[name].adaptive:
-            adaptive = ", ".join(row.name for row in INTEGRATORS.values() if row.adaptive)
-            raise problem(
-                at=["tolerance"],
-                got=self.tolerance,
-                expected=f"a step: {name} does not adapt it",
-                cure=f"write step = ...; these adapt: {adaptive}",
-            )
-        if self.step is None and self.tolerance is None:
-            raise problem("missing", at=["step"], expected=f"a step for {name}", cure="such as step = 1e-3")
-        for row in INTEGRATORS.values():
-            if row.option in self.model_fields_set and row.name != name:
-                raise problem(
-                    f"{name} does not read it",
-                    at=[row.option],
-                    got=getattr(self, row.option),
-                    expected=f'integrator = "{row.name}" with it',
-                    cure="drop it or change the integrator",
-                )
-        return self
-
-
-class InitialSpec(Table):
-    """[initial]: what a motion starts with."""
-
-    velocity: Vector = key("three numbers; such as [1.0, 0.0, 0.0]", (0.0, 0.0, 0.0))
-    spin: Vector = key("three numbers; rad / unit of time, about `centre`", (0.0, 0.0, 0.0))
-    centre: Literal["mass"] | Vector = key('"mass" or a point [x, y, z]', "mass")
 
 
 class CurveSpec(Table):
@@ -283,8 +161,8 @@ class OutputSpec(Table):
 class ProbeSpec(Table):
     """One [[probe]]: the mean position of a group."""
 
-    name: Name = key("a name, in quotes")
-    group: Name = key("a group's name")
+    name: Name = key("a name in quotes; it heads the columns of probes.csv")
+    group: Name = key("a group's name in quotes; of the mesh file or of [groups]")
     mean: Literal["nodes", "area"] = key("a kind of mean", "nodes")
 
 
@@ -301,8 +179,8 @@ class CaseSpec(Table):
     """A whole case file."""
 
     format: Literal[1] = key("1; this program reads format 1", 1)
-    title: str = key("a title, in quotes")
-    units: str = key("a label, in quotes; nothing is converted", "SI")
+    title: str = key('a title in quotes; such as title = "Block under compression"')
+    units: str = key("a label in quotes; for plots, nothing is converted", "SI")
     mesh: MeshSpec = key("a table [mesh]; with file and element")
     groups: dict[Name, GroupSpec] = key("a table [groups]; of choices by geometry", {})
     material: tuple[MaterialSpec, ...] = key("a table [material]; or several [[material]]")
@@ -311,7 +189,7 @@ class CaseSpec(Table):
     statics: StaticsSpec | None = key("a table [statics]", None)
     dynamics: DynamicsSpec | None = key("a table [dynamics]", None)
     initial: InitialSpec | None = key("a table [initial]", None)
-    output: OutputSpec = key("a table [output]", OutputSpec())
+    output: OutputSpec = Field(default_factory=OutputSpec, description="a table [output]")
     probe: tuple[ProbeSpec, ...] = key("tables; write [[probe]]", ())
     petsc: dict[Name, str | int | float | bool] = key(
         'an option with its value, without the leading dash; such as ksp_type = "cg"', {}
@@ -321,7 +199,7 @@ class CaseSpec(Table):
     @model_validator(mode="before")
     @classmethod
     def _motion_ramps(cls, data: Any) -> Any:
-        """In motion loads are there from the start and moves begin and end at rest, unless the case says more."""
+        """In motion loads act from the start and moves begin and end at rest, unless the case says more."""
         if not (isinstance(data, dict) and "dynamics" in data):
             return data
         defaults = {"constraint": "cosine", "load": "constant"}

@@ -58,7 +58,7 @@ def read(file: Path) -> dict[str, Any]:
 
 
 def write(data: dict[str, Any]) -> str:
-    """TOML text of `data`: values first, then a [table] for each dict and a [[table]] for each entry of a list of dicts."""
+    """TOML text of `data`: values, a [table] for each dict, a [[table]] for each entry of a list of dicts."""
     plain = {name: value for name, value in data.items() if not _is_table(value)}
     blocks = [_pairs(plain)] if plain else []
     for name, value in data.items():

@@ -1,4 +1,4 @@
-"""The kinds of values a case file holds: axes, vectors, ramps, directions; and how a check says what is wrong."""
+"""The kinds of values a case file holds: vectors, ramps, directions; and how a check says what is wrong."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Ramp = Literal["linear", "cosine", "constant"] | tuple[tuple[float, float], ...]
 class Table(BaseModel):
     """A table of the case file: known keys only, exact types, finite numbers, unchangeable."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 class Direction(NamedTuple):
@@ -37,7 +37,7 @@ class Direction(NamedTuple):
 
 
 def key(expected: str, default: Any = ..., **limits: Any) -> Any:
-    """A key of a table. `expected` says in words what it holds, and after "; " what to do about a wrong value."""
+    """A key of a table. `expected` says in words what it holds, and after "; " the cure of a wrong value."""
     return Field(default, description=expected, **limits)
 
 
@@ -50,7 +50,7 @@ def problem(
     cure: str = "",
     more: int = 0,
 ) -> PydanticCustomError:
-    """What a check raises. `at` is the way from the checked table to the key; `more` counts further problems."""
+    """What a check raises. `at` leads from the checked table to the key; `more` counts further problems."""
     context = {"what": what, "at": tuple(at), "got": got, "expected": expected, "cure": cure, "more": more}
     return PydanticCustomError("problem", "{what}", context)
 
@@ -88,7 +88,7 @@ def _ramp(value: object) -> object:
             expected=f'"linear", "cosine", "constant" or {table}', cure="such as [[0, 0], [0.5, 1], [1, 0]]"
         )
     s = [row[0] for row in rows]
-    if not (0 <= s[0] and s[-1] <= 1 and all(a < b for a, b in zip(s, s[1:], strict=False))):
+    if not (s[0] >= 0 and s[-1] <= 1 and all(a < b for a, b in zip(s, s[1:], strict=False))):
         raise problem(
             "s is not rising within [0, 1]", got=s, expected=table, cure="sort the rows, each s once"
         )

@@ -1,0 +1,269 @@
+"""From a case and its mesh to tables over nodes and cells: the root rank's part of building a model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ancf_petsc.case.load import Case
+from ancf_petsc.case.schema import CaseSpec, ForceSpec
+from ancf_petsc.element.catalog import element
+from ancf_petsc.element.element import Element
+from ancf_petsc.errors import CaseError
+from ancf_petsc.mesh.check import connected_pieces
+from ancf_petsc.mesh.groups import cells_of, choose_groups, find_group, parts_for_load, surface_of
+from ancf_petsc.mesh.mesh import Group, Mesh
+from ancf_petsc.mesh.read import read_mesh
+from ancf_petsc.system.constraint import ConstraintTable, Motion, Support, tabulate
+from ancf_petsc.system.free_motion import free_motions
+from ancf_petsc.system.load import linear_shares, measures
+from ancf_petsc.system.measures import AXES, CurveChoice
+from ancf_petsc.system.ramp import make_ramp
+
+STROKE = "stroke"
+
+
+@dataclass
+class Blueprint:
+    """Tables over all nodes in use (n) and all cells (e), in file order.
+
+    cells (e, k): indices of nodes in use. nodes (n,): their index in the mesh's points.
+    shares: force load number -> (n,) share of each node in the total.
+    members: group -> (n,) bool. means: name -> (n,) weights that add up to 1.
+    material (e,): index into the case's materials.
+    """
+
+    mesh: Mesh
+    element: Element
+    nodes: NDArray[np.int64]
+    cells: NDArray[np.int64]
+    constraints: ConstraintTable
+    material: NDArray[np.int8]
+    curve: CurveChoice | None
+    shares: dict[int, NDArray] = field(default_factory=dict)
+    members: dict[str, NDArray] = field(default_factory=dict)
+    means: dict[str, NDArray] = field(default_factory=dict)
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """(n, 3) undeformed positions of the nodes in use."""
+        return self.mesh.points[self.nodes]
+
+
+def draw(case: Case) -> Blueprint:
+    """Read the mesh and enter everything the case says into tables. Raises CaseError."""
+    spec = case.spec
+    row = element(spec.mesh.element)
+    mesh = read_mesh(case.mesh_file, row.kinds, duplicates=spec.mesh.duplicates, element=row.code)
+    return draw_on(case, mesh)
+
+
+def draw_on(case: Case, mesh: Mesh) -> Blueprint:
+    """The tables of a case on a mesh that was read for it. Raises CaseError."""
+    spec = case.spec
+    mesh.groups |= choose_groups(mesh, {name: group.model_dump() for name, group in spec.groups.items()})
+    drawer = _Drawer(case, mesh)
+    constraints = drawer.constraints()
+    if spec.statics is not None:
+        drawer.refuse_free_motions(constraints)
+    return Blueprint(
+        mesh=mesh,
+        element=element(spec.mesh.element),
+        nodes=drawer.nodes,
+        cells=drawer.compact[mesh.cells],
+        constraints=constraints,
+        material=drawer.materials(),
+        curve=drawer.curve(),
+        shares=drawer.shares(),
+        members=drawer.members(),
+        means=drawer.means(),
+    )
+
+
+class _Drawer:
+    """Fills the tables of a blueprint, one method a table."""
+
+    def __init__(self, case: Case, mesh: Mesh) -> None:
+        self.file = case.file
+        self.spec: CaseSpec = case.spec
+        self.mesh = mesh
+        self.nodes = np.flatnonzero(mesh.used)
+        self.compact = np.full(len(mesh.points), -1, np.int64)
+        self.compact[self.nodes] = np.arange(len(self.nodes))
+
+    def group(self, name: str, key: str) -> Group:
+        return find_group(self.mesh, name, key, self.file)
+
+    def constraints(self) -> ConstraintTable:
+        supports = []
+        for spec in self.spec.constraint:
+            group = self.group(spec.group, f"constraint.{spec.group}.group")
+            ramp = make_ramp(spec.ramp, "linear")
+            motions = {AXES.index(axis): Motion(0.0, ramp) for axis in spec.fix}
+            motions |= {AXES.index(axis): Motion(amount, ramp) for axis, amount in spec.move.items()}
+            supports.append(Support(spec.group, self.compact[group.nodes], motions))
+        try:
+            return tabulate(supports, len(self.nodes), self.mesh.node_numbers[self.nodes])
+        except CaseError as error:
+            error.file = self.file
+            raise
+
+    def refuse_free_motions(self, constraints: ConstraintTable) -> None:
+        """Raise CaseError if a connected piece of the body can move without deforming."""
+        pieces, label = connected_pieces(self.compact[self.mesh.cells], len(self.nodes))
+        points = self.mesh.points[self.nodes]
+        free = free_motions(points, constraints.motion >= 0, label, pieces)
+        if not free:
+            return
+        piece, names = next(iter(free.items()))
+        where = ""
+        if pieces > 1:
+            centre = ", ".join(f"{c:.6g}" for c in points[label == piece].mean(axis=0))
+            where = f" of the piece around ({centre}), {len(free)} of {pieces} pieces,"
+        raise CaseError(
+            f"the supports{where} leave rigid motions free: {'; '.join(names)}",
+            file=self.file,
+            key="constraint",
+            expected="statics to have none",
+            cure="add a [[constraint]] that holds them, or ask for [dynamics]",
+        )
+
+    def materials(self) -> NDArray[np.int8]:
+        """The material of each cell; the one without a group takes what is left."""
+        material = np.full(len(self.mesh.cells), -1, np.int8)
+        for number, spec in enumerate(self.spec.material):
+            if spec.group is None:
+                continue
+            cells = cells_of(self.mesh, self.group(spec.group, f"material.{spec.group}.group"))
+            if not len(cells):
+                raise CaseError(
+                    "the group holds no elements",
+                    file=self.file,
+                    key=f"material.{spec.group}.group",
+                    got=spec.group,
+                    expected="a group of volume, or of all nodes of some elements",
+                )
+            twice = cells[material[cells] >= 0]
+            if len(twice):
+                other = self.spec.material[material[twice[0]]].group
+                raise CaseError(
+                    f"{len(twice)} elements are in {other!r} as well, "
+                    f"the first is element {self.mesh.cell_numbers[twice[0]]}",
+                    file=self.file,
+                    key=f"material.{spec.group}.group",
+                    expected="one material an element",
+                    cure="take the shared elements out of one group",
+                )
+            material[cells] = number
+        rest = next((i for i, spec in enumerate(self.spec.material) if spec.group is None), None)
+        left = np.flatnonzero(material < 0)
+        if len(left) and rest is None:
+            raise CaseError(
+                f"{len(left)} elements have no material, the first is element {self.mesh.cell_numbers[left[0]]}",
+                file=self.file,
+                key="material",
+                expected="a material for every element",
+                cure="add a [[material]] without group: it takes the rest",
+            )
+        material[left] = rest if rest is not None else 0
+        return material
+
+    def shares(self) -> dict[int, NDArray]:
+        """Shares of the nodes in each force load."""
+        shares = {}
+        for number, spec in enumerate(self.spec.load):
+            if isinstance(spec, ForceSpec):
+                group = self.group(spec.group, f"load.{number}.group")
+                dimension, parts = parts_for_load(self.mesh, group)
+                shares[number] = linear_shares(self.mesh.points, dimension, parts)[self.nodes]
+        return shares
+
+    def curve(self) -> CurveChoice | None:
+        chosen = self.spec.output.curve
+        if chosen is None:
+            return None
+        group = self.group(chosen.force.group, "output.curve.force")
+        self.group(chosen.stroke.group, "output.curve.stroke")
+        faces = surface_of(self.mesh, group)
+        area = None if faces is None else float(measures(self.mesh.points, 2, faces).sum())
+        return CurveChoice(
+            chosen.force.group, chosen.force.component, chosen.stroke.group, chosen.stroke.component, area
+        )
+
+    def members(self) -> dict[str, NDArray]:
+        """Groups whose reactions are wanted: the constrained ones and the curve's."""
+        names = [spec.group for spec in self.spec.constraint]
+        if self.spec.output.curve:
+            names.append(self.spec.output.curve.force.group)
+        members = {}
+        for name in dict.fromkeys(names):
+            members[name] = np.zeros(len(self.nodes), bool)
+            members[name][self.compact[self.mesh.groups[name].nodes]] = True
+        return members
+
+    def means(self) -> dict[str, NDArray]:
+        """Weights of the stroke and of the probes."""
+        means = {}
+        if self.spec.output.curve:
+            group = self.mesh.groups[self.spec.output.curve.stroke.group]
+            means[STROKE] = self._node_mean(group)
+        for probe in self.spec.probe:
+            group = self.group(probe.group, f"probe.{probe.name}.group")
+            mean = self._area_mean(group, probe.name) if probe.mean == "area" else self._node_mean(group)
+            means[f"probe {probe.name}"] = mean
+        return means
+
+    def _node_mean(self, group: Group) -> NDArray:
+        weights = np.zeros(len(self.nodes))
+        weights[self.compact[group.nodes]] = 1.0 / len(group.nodes)
+        return weights
+
+    def _area_mean(self, group: Group, name: str) -> NDArray:
+        faces = surface_of(self.mesh, group)
+        if faces is None:
+            raise CaseError(
+                'mean = "area" needs a surface',
+                file=self.file,
+                key=f"probe.{name}.mean",
+                got=group.name,
+                expected="a group of boundary faces",
+                cure='mean = "nodes" takes any group',
+            )
+        return linear_shares(self.mesh.points, 2, faces)[self.nodes]
+
+
+def output_times(spec: CaseSpec, file: object = None) -> list[float]:
+    """Pseudo-times of the outputs of a static case, ascending, the last is 1."""
+    statics = spec.statics
+    assert statics is not None
+    if statics.times:
+        return sorted({*statics.times, 1.0})
+    if statics.strokes:
+        return sorted({*_stroke_times(spec, statics.strokes, file), 1.0})
+    return [k / statics.steps for k in range(1, statics.steps + 1)]
+
+
+def _stroke_times(spec: CaseSpec, strokes: tuple[float, ...], file: object) -> list[float]:
+    """When the ramp of the driven group first reaches each stroke."""
+    curve = spec.output.curve
+    assert curve is not None
+    driver = next(c for c in spec.constraint if c.group == curve.stroke.group and curve.stroke.axis in c.move)
+    amplitude = abs(driver.move[curve.stroke.axis])
+    ramp = make_ramp(driver.ramp, "linear")
+    times = []
+    for stroke in strokes:
+        s = ramp.first_time(
+            min(stroke / amplitude, 1.0) if stroke <= amplitude * (1 + 1e-12) else stroke / amplitude
+        )
+        if s is None:
+            raise CaseError(
+                file=file,
+                key="statics.strokes",
+                got=stroke,
+                expected=f"a stroke that the motion of {driver.group!r} reaches",
+                cure=f"it moves by {amplitude:g} at most",
+            )
+        times.append(s)
+    return [s for s in times if s > 0.0]
