@@ -15,7 +15,7 @@ Integers = NDArray[np.int64]
 class Group:
     """A named set of nodes and the parts it is meshed with.
 
-    nodes: (k,) ascending indices of points.
+    nodes: (k,) ascending indices of points, mid-nodes of quadratic parts included.
     parts: dimension (0 point, 1 line, 2 face, 3 volume) -> (m, corners) indices of points, each part
         once. Empty for a group that is only a set of nodes.
     """
@@ -35,6 +35,7 @@ class Mesh:
     groups: name -> Group, from the file and, once chosen, from the case.
     node_numbers, cell_numbers: (n,), (e,) numbers in the file, ascending. Results use this order.
     used: (n,) whether a cell uses the point.
+    boundary: (m, corners) sides of one cell only; `groups.boundary_faces` finds them when first asked.
     notes: what the reader did or noticed, for the log.
     """
 
@@ -47,6 +48,7 @@ class Mesh:
     used: NDArray[np.bool_]
     notes: list[str] = field(default_factory=list)
     source: str = ""
+    boundary: Integers | None = field(default=None, repr=False)
 
     @property
     def size(self) -> float:

@@ -1,0 +1,126 @@
+"""Meshes in the other formats, read by meshio.
+
+Named groups come from cell and point sets, from the families of MED, from Gmsh's tags with their names in
+the field data, and from the integer data into which meshio turns sets when it writes VTU, VTK and XDMF.
+These formats lose or hide their own numbers: nodes and cells are numbered from 1 as they stand in the file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .kinds import KINDS
+from .mesh import Integers
+from .raw import Block, RawMesh, mesh_error
+
+TAGS = ("gmsh:physical", "medit:ref", "nastran:ref", "netgen:index", "su2:tag", "abaqus:material")
+SAME = {"tetra4": "tetra"}
+ALL = ".msh .vtu .vtk .xdmf .inp .med .bdf .mesh"
+
+
+def read_meshio(path: Path) -> RawMesh:
+    """The mesh in a file of any format meshio reads."""
+    mesh = _read(path)
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.points.shape[1]] = mesh.points[:, :3]
+    numbers = np.arange(1, len(points) + 1)
+    cells = [np.asarray(block.data) for block in mesh.cells]
+    kinds = [SAME.get(block.type, block.type) for block in mesh.cells]
+    first = np.cumsum([1, *map(len, cells)])
+    blocks = [
+        Block(kind, np.arange(start, start + len(nodes)), nodes.astype(np.int64) + 1)
+        for kind, nodes, start in zip(kinds, cells, first)
+    ]
+    listed = [
+        Block(block.kind, block.numbers[rows], block.nodes[rows], (name,))
+        for name, number, rows in _cell_sets(mesh, kinds)
+        for block in (blocks[number],)
+        if len(rows)
+    ]
+    node_sets = {name: np.asarray(rows, dtype=np.int64) + 1 for name, rows in _point_sets(mesh)}
+    names = [*mesh.cell_sets, *(name for block in listed for name in block.names), *node_sets]
+    return RawMesh(numbers, points, blocks + listed, list(dict.fromkeys(names)), node_sets)
+
+
+def _read(path: Path) -> Any:
+    """meshio's mesh; meshio prints, and may leave the interpreter, when it cannot read."""
+    import meshio
+
+    wrong = mesh_error(path)
+    if not set(path.suffixes) & set(meshio.extension_to_filetypes):
+        raise wrong("not a format meshes are read from", got=path.suffix, expected=f"one of {ALL} or what meshio reads")
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            mesh = meshio.read(path)
+    except SystemExit:
+        reason = said.getvalue()
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+    else:
+        return mesh
+    reason = " ".join(reason.split())
+    raise wrong(f"meshio cannot read it ({reason})", cure="the file may be truncated or damaged: write it again")
+
+
+def _cell_sets(mesh: Any, kinds: list[str]) -> Iterator[tuple[str, int, Integers]]:
+    """Name, number of the cell block, rows of it."""
+    for name, by_block in mesh.cell_sets.items():
+        for block, rows in enumerate(by_block[: len(kinds)]):
+            if rows is not None:
+                rows = np.asarray(rows, dtype=np.int64)
+                yield name, block, rows[rows < len(mesh.cells[block].data)]
+    for key, by_block in mesh.cell_data.items():
+        if key == "cell_tags" and hasattr(mesh, "cell_tags"):
+            names = {tag: families for tag, families in mesh.cell_tags.items()}
+        elif key in TAGS:
+            names = None
+        else:
+            names = _set_names(key, by_block)
+            if not names:
+                continue
+        for block, tags in enumerate(by_block):
+            dimension = KINDS[kinds[block]].dimension if kinds[block] in KINDS else 3
+            for tag in np.unique(tags):
+                every = _tag_names(mesh, dimension, int(tag)) if names is None else names.get(int(tag), ())
+                for name in every:
+                    yield name, block, np.flatnonzero(tags == tag)
+
+
+def _point_sets(mesh: Any) -> Iterator[tuple[str, Integers]]:
+    """Name, rows of the points."""
+    yield from mesh.point_sets.items()
+    for key, tags in mesh.point_data.items():
+        families = getattr(mesh, "point_tags", {}) if key == "point_tags" else _set_names(key, [tags])
+        rows: dict[str, list[Integers]] = {}
+        for tag, names in families.items():
+            for name in names:
+                rows.setdefault(name, []).append(np.flatnonzero(tags == tag))
+        for name, parts in rows.items():
+            yield name, np.unique(np.concatenate(parts))
+
+
+def _tag_names(mesh: Any, dimension: int, tag: int) -> list[str]:
+    """The names field data gives to a tag of a dimension; 0 is no group."""
+    if tag == 0:
+        return []
+    named = [
+        name
+        for name, value in mesh.field_data.items()
+        if np.size(value) == 2 and tuple(np.ravel(value)) == (tag, dimension)
+    ]
+    return named or [f"physical_{dimension}_{tag}"]
+
+
+def _set_names(key: str, data: list[np.ndarray]) -> dict[int, list[str]]:
+    """Tag -> name where `key` is the names of sets joined by "-" and the data count them from 0, -1 for none."""
+    names = key.split("-")
+    tags = np.unique(np.concatenate([np.ravel(part) for part in data]))
+    counted = tags.dtype.kind in "iu" and len(tags) and tags.min() >= -1 and tags.max() == len(names) - 1
+    return {tag: [name] for tag, name in enumerate(names)} if counted and ":" not in key else {}

@@ -1,0 +1,47 @@
+"""Reading a mesh from a file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from .assemble import assemble
+from .gmsh_file import read_gmsh
+from .mesh import Mesh
+from .meshio_file import read_meshio
+from .raw import mesh_error
+
+
+def read_mesh(
+    path: str | Path, kinds: tuple[str, ...], *, duplicates: str = "error", element: str = "3413"
+) -> Mesh:
+    """The mesh in a file: nodes and cells in ascending file number, groups by physical name.
+
+    kinds: meshio's names of the cells the element accepts; the body is meshed with one of them.
+    duplicates: what to do with coincident nodes: "error", "keep" (a crack, two bodies) or "merge".
+    element: the element's code, for messages.
+
+    Raises MeshError where the file cannot be read or the mesh cannot be computed with.
+    """
+    path = Path(path)
+    _require_file(path)
+    raw = read_gmsh(path) if path.suffix.lower() == ".msh" and not _is_ansys(path) else read_meshio(path)
+    return assemble(raw, path, kinds, duplicates, element)
+
+
+def _require_file(path: Path) -> None:
+    wrong = mesh_error(path)
+    if not path.exists():
+        raise wrong("there is no such file", cure="give the path of the mesh from the case file's folder")
+    if not path.is_file():
+        raise wrong("not a file", expected="a mesh file")
+    if not os.access(path, os.R_OK):
+        raise wrong("the file may not be read", cure="change its permissions")
+    if not path.stat().st_size:
+        raise wrong("the file is empty", cure="write the mesh again")
+
+
+def _is_ansys(path: Path) -> bool:
+    """Fluent's meshes have the same suffix as Gmsh's; they begin with a bracket."""
+    with open(path, "rb") as file:
+        return file.read(64).lstrip()[:1] == b"("
