@@ -1,7 +1,7 @@
 """The log: lines on the terminal and in log.txt, written by the root rank only, and a progress bar.
 
-Library modules take `logging.getLogger("ancf")` and say what happens; the command line calls `configure`. Lines
-of the logger "ancf.step", one a step, give way to the bar where there is one and are in the file all the same.
+Library modules take `logging.getLogger("ancf")` and say what happens; the command line calls `configure`.
+Lines of the logger "ancf.step", one a step, give way to the bar where there is one; the file has them all.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def configure(folder: str | Path | None = None, rank: int = 0, verbosity: int = 
 
 
 def attach_file(path: str | Path) -> None:
-    """Write all lines, those so far too, to a new file. Does nothing where `configure` did not ask for a log."""
+    """Write all lines, those so far too, to a new file. Does nothing where `configure` made no log."""
     waiting = [handler for handler in LOGGER.handlers if isinstance(handler, _Pending)]
     if not waiting:
         return
@@ -158,7 +158,7 @@ def progress(total: float, unit: str = "") -> Iterator[Progress]:
 
 
 def on_terminal() -> bool:
-    """Whether a person sees standard output, also through mpiexec, which gives its processes a terminal anyway."""
+    """Whether a person sees standard output; mpiexec gives its processes a terminal even into a file."""
     if not sys.stdout.isatty() or os.environ.get("TERM", "dumb") == "dumb":
         return False
     if "OMPI_COMM_WORLD_RANK" not in os.environ:

@@ -1,0 +1,179 @@
+"""The command `ancf`: one module a verb, imported when it is used.
+
+A verb's module has HELP (one line), add_arguments(parser) and execute(arguments), which returns the exit code.
+What follows `--` on the command line is in `arguments.petsc_options`, for verbs that have PETSC_OPTIONS = True.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import IO, Any, NoReturn
+
+from ancf_petsc.errors import AncfError, CaseError, Interrupted, did_you_mean
+
+VERBS = {
+    "run": ("ancf_petsc.cli.run", "solve a case"),
+    "check": ("ancf_petsc.cli.check", "check a case and its mesh, solve nothing"),
+    "plot": ("ancf_petsc.cli.plot", "draw the curves of runs"),
+    "view": ("ancf_petsc.cli.view", "look at a run, or at a case before it runs"),
+    "info": ("ancf_petsc.cli.info", "versions, elements, self-check"),
+    "mesh": ("ancf_petsc.cli.mesh", "make one of the project's meshes at a size"),
+    "new": ("ancf_petsc.cli.new", "write a commented case to start from"),
+}
+EPILOG = """\
+exit codes: 0 done; 2 the input is wrong; 3 no equilibrium further on; 4 the environment is wrong; 130 interrupted
+in parallel: mpiexec -n 4 ancf run CASE; PETSc options follow --, as in: ancf run CASE -- -ksp_type cg
+ANCF_TRACEBACK=1 shows where an error comes from; ancf VERB --help has the options of a verb"""
+RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
+SIZE = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
+BROKEN_PIPE = 141
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    try:
+        code = _command(words)
+        sys.stdout.flush()
+    except SystemExit as leave:
+        return leave.code if isinstance(leave.code, int) else int(leave.code is not None)
+    except AncfError as error:
+        return _tell(error)
+    except KeyboardInterrupt:
+        _abort_others(Interrupted.exit_code)
+        return _tell(Interrupted("interrupted"))
+    except BrokenPipeError:
+        _abort_others(BROKEN_PIPE)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    except Exception:
+        if rank_count() == 1:
+            raise
+        sys.excepthook(*sys.exc_info())  # type: ignore[arg-type]
+        _abort_others(1)
+        return 1
+    return code
+
+
+def rank() -> int:
+    """This process's number among those that a launcher started, 0 alone; mpi4py stays unimported."""
+    return _number(RANK, 0)
+
+
+def rank_count() -> int:
+    """How many processes a launcher started."""
+    return _number(SIZE, 1)
+
+
+def _number(names: Sequence[str], default: int) -> int:
+    value = next((os.environ[name] for name in names if name in os.environ), "")
+    return int(value) if value.isdecimal() else default
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose mistakes are CaseErrors of one line, and which speaks on the root rank only."""
+
+    def error(self, message: str) -> NoReturn:
+        raise CaseError(message, file=self.prog, cure=f"see {self.prog} --help")
+
+    def _print_message(self, message: str, file: IO[str] | None = None) -> None:
+        if rank() == 0:
+            super()._print_message(message, file)
+
+
+def _command(words: list[str]) -> int:
+    top = _top_parser()
+    chosen = top.parse_args(words[:1])
+    if chosen.verb is None:
+        top.print_help()
+        return 0
+    if chosen.verb not in VERBS:
+        raise _unknown_verb(chosen.verb)
+    verb = import_module(VERBS[chosen.verb][0])
+    parser = Parser(
+        prog=f"ancf {chosen.verb}",
+        description=verb.HELP,
+        epilog=getattr(verb, "EPILOG", None),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    verb.add_arguments(parser)
+    own, options = _split(words[1:])
+    arguments = parser.parse_args(own)
+    if options and not getattr(verb, "PETSC_OPTIONS", False):
+        parser.error(f"{chosen.verb} takes no PETSc options: found {' '.join(options)}")
+    arguments.petsc_options = options
+    return int(verb.execute(arguments))
+
+
+def _split(words: list[str]) -> tuple[list[str], list[str]]:
+    """The words before and after the first `--`."""
+    place = words.index("--") if "--" in words else len(words)
+    return words[:place], words[place + 1 :]
+
+
+def _top_parser() -> Parser:
+    verbs = "\n".join(f"  {name:<8}{line}" for name, (_, line) in VERBS.items())
+    parser = Parser(
+        prog="ancf",
+        usage="ancf VERB ...",
+        description="Large-deformation solids in absolute nodal coordinates, in parallel, on PETSc.\n\nverbs:\n"
+        + verbs,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
+    parser.add_argument("verb", nargs="?", help=argparse.SUPPRESS)
+    return parser
+
+
+class _Version(argparse.Action):
+    """Looks the version up only when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            number = version("ancf_petsc")
+        except PackageNotFoundError:
+            number = "(not installed)"
+        parser.exit(0, f"ancf_petsc {number}\n")
+
+
+def _unknown_verb(word: str) -> CaseError:
+    case = word.endswith(".toml") or (Path(word) / "case.toml").is_file()
+    cure = f"did you mean: ancf run {word}" if case else did_you_mean(word, tuple(VERBS))
+    return CaseError("unknown verb", file="ancf", got=word, cure=cure)
+
+
+def _tell(error: AncfError) -> int:
+    """One line on stderr by the root rank; the exit code.
+
+    A rank that never met MPI leaves with 0: the launcher, seeing it fail first, would end the root before it spoke.
+    """
+    if rank() == 0:
+        if os.environ.get("ANCF_TRACEBACK", "") not in ("", "0"):
+            sys.excepthook(type(error), error, error.__traceback__)
+        line = " ".join(str(error).splitlines()) or type(error).__name__
+        with suppress(BrokenPipeError):
+            print(f"error: {line}", file=sys.stderr, flush=True)
+        return error.exit_code
+    return error.exit_code if _mpi() else 0
+
+
+def _mpi() -> Any:
+    """mpi4py.MPI if this process has started MPI."""
+    return sys.modules.get("mpi4py.MPI")
+
+
+def _abort_others(code: int) -> None:
+    """End all ranks, for they would wait for this one."""
+    if rank_count() > 1 and (mpi := _mpi()) is not None:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        mpi.COMM_WORLD.Abort(code)
