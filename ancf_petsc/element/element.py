@@ -133,10 +133,16 @@ class Element:
         functionals = [
             (self.cell.centre(node.corners), orders[j]) for node in self.nodes for j in range(node.vectors)
         ]
-        if not self.condensed:
-            return shape.shape_coefficients(self.exponents, functionals)
-        functionals += [(self.cell.centre(facet), orders[0]) for facet in self.cell.facets]
-        inverse = shape.shape_coefficients(self.exponents, functionals)
+        if self.condensed:
+            functionals += [(self.cell.centre(facet), orders[0]) for facet in self.cell.facets]
+        try:
+            inverse = shape.shape_coefficients(self.exponents, functionals)
+        except ValueError as error:
+            raise ValueError(f"element {self.code}: {error}") from error
+        return self._condense(inverse) if self.condensed else inverse
+
+    def _condense(self, inverse: shape.Matrix) -> shape.Matrix:
+        """Coefficients (p, a) with the values at face centres, the last columns, following the corners."""
         n = self.functions
         centres = self._condensed_face_centres()
         return [
