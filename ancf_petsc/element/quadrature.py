@@ -80,13 +80,13 @@ def _simplex_rule(name: str, points: int) -> Rule:
     if points not in table:
         raise ValueError(f"no rule of {points} points on the {name}; there are {', '.join(map(str, table))}")
     degree, orbits = table[points]
-    barycentric, weights = [], []
+    barycentric, shares = [], []
     for pattern, weight, values in orbits:
         orbit = _orbit(pattern, values)
         barycentric += orbit
-        weights += [weight] * len(orbit)
+        shares += [weight] * len(orbit)
     cell = CELLS[name]
-    weights = np.array(weights) * (float(cell.volume) / sum(weights))
+    weights = np.array(shares) * (float(cell.volume) / sum(shares))
     return Rule(cell, degree, np.array(barycentric)[:, 1:], weights)
 
 
