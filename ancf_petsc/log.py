@@ -116,6 +116,27 @@ def attach_file(path: str | Path) -> None:
     LOGGER.addHandler(file)
 
 
+@contextmanager
+def log_file(path: Path, rank: int) -> Iterator[None]:
+    """Write all lines of a block, and those that waited for a file, to a new file on the root rank."""
+    if rank:
+        yield
+        return
+    level = LOGGER.level
+    LOGGER.setLevel(min(LOGGER.getEffectiveLevel(), logging.INFO))
+    before = set(LOGGER.handlers)
+    if not any(isinstance(handler, _Pending) for handler in before):
+        LOGGER.addHandler(_Pending())
+    attach_file(path)
+    try:
+        yield
+    finally:
+        for handler in set(LOGGER.handlers) - before:
+            LOGGER.removeHandler(handler)
+            handler.close()
+        LOGGER.setLevel(level)
+
+
 def close() -> None:
     """Take the handlers of `configure` away and close their files."""
     for handler in list(LOGGER.handlers):

@@ -13,12 +13,13 @@ from ancf_petsc.element.catalog import element
 from ancf_petsc.element.element import Element
 from ancf_petsc.errors import CaseError
 from ancf_petsc.mesh.check import connected_pieces
-from ancf_petsc.mesh.groups import cells_of, choose_groups, find_group, parts_for_load, surface_of
+from ancf_petsc.mesh.groups import cells_of, choose_groups, find_group, measure, parts_for_load, surface_of
+from ancf_petsc.mesh.kinds import part_kind, part_sizes
 from ancf_petsc.mesh.mesh import Group, Mesh
 from ancf_petsc.mesh.read import read_mesh
 from ancf_petsc.system.constraint import ConstraintTable, Motion, Support, tabulate
 from ancf_petsc.system.free_motion import free_motions
-from ancf_petsc.system.load import linear_shares, measures
+from ancf_petsc.system.load import linear_shares
 from ancf_petsc.system.measures import AXES, CurveChoice
 from ancf_petsc.system.ramp import make_ramp
 
@@ -63,7 +64,8 @@ def draw(case: Case) -> Blueprint:
 def draw_on(case: Case, mesh: Mesh) -> Blueprint:
     """The tables of a case on a mesh that was read for it. Raises CaseError."""
     spec = case.spec
-    mesh.groups |= choose_groups(mesh, {name: group.model_dump() for name, group in spec.groups.items()})
+    chosen = {name: group.model_dump(exclude_none=True) for name, group in spec.groups.items()}
+    mesh.groups |= choose_groups(mesh, chosen, file=case.file)
     drawer = _Drawer(case, mesh)
     constraints = drawer.constraints()
     if spec.statics is not None:
@@ -177,7 +179,7 @@ class _Drawer:
             if isinstance(spec, ForceSpec):
                 group = self.group(spec.group, f"load.{number}.group")
                 dimension, parts = parts_for_load(self.mesh, group)
-                shares[number] = linear_shares(self.mesh.points, dimension, parts)[self.nodes]
+                shares[number] = self._shares(dimension, parts)
         return shares
 
     def curve(self) -> CurveChoice | None:
@@ -187,7 +189,7 @@ class _Drawer:
         group = self.group(chosen.force.group, "output.curve.force")
         self.group(chosen.stroke.group, "output.curve.stroke")
         faces = surface_of(self.mesh, group)
-        area = None if faces is None else float(measures(self.mesh.points, 2, faces).sum())
+        area = None if faces is None else measure(self.mesh, 2, faces)
         return CurveChoice(
             chosen.force.group, chosen.force.component, chosen.stroke.group, chosen.stroke.component, area
         )
@@ -231,7 +233,15 @@ class _Drawer:
                 expected="a group of boundary faces",
                 cure='mean = "nodes" takes any group',
             )
-        return linear_shares(self.mesh.points, 2, faces)[self.nodes]
+        return self._shares(2, faces)
+
+    def _shares(self, dimension: int, parts: NDArray) -> NDArray:
+        """Shares (n,) of the nodes in a sum spread evenly over parts."""
+        if dimension == 0:
+            parts, sizes = parts.reshape(-1, 1), np.ones(len(parts))
+        else:
+            sizes = np.abs(part_sizes(self.mesh.points, parts, part_kind(dimension, parts.shape[1])))
+        return linear_shares(len(self.mesh.points), parts, sizes)[self.nodes]
 
 
 def output_times(spec: CaseSpec, file: object = None) -> list[float]:

@@ -66,7 +66,7 @@ def _translate(
     detail: Mapping[str, Any], data: dict[str, Any], source: dict[str, Any], file: str | Path | None
 ) -> CaseError:
     kind, context = detail["type"], detail.get("ctx", {})
-    place = _place((*detail["loc"], *context.get("at", ())), data)
+    place = _below(_place(detail["loc"], data), context.get("at", ()))
     way, got = place.way, place.value
     what, (expected, _, cure) = "", ((place.field and place.field.description) or "").partition("; ")
     if kind == "problem":
@@ -116,6 +116,15 @@ def _place(loc: Sequence[str | int], data: dict[str, Any]) -> Place:
         field, table = key_field or field, owner or table
         way, value = (*way, item), value[item] if inside else ABSENT
     return Place(way, value, field, table)
+
+
+def _below(place: Place, way: Way) -> Place:
+    """The place that a check names itself, as far below the table it checked."""
+    value = place.value
+    for item in way:
+        inside = isinstance(item, int) or (isinstance(value, dict) and item in value)
+        value = value[item] if inside else ABSENT
+    return place._replace(way=(*place.way, *way), value=value)
 
 
 def _step(

@@ -59,7 +59,7 @@ def _value(way: tuple[str, ...], text: str) -> Any:
         tables = tomllib.loads(f"value = {text}")
         value = tables["value"] if len(tables) == 1 else None
     except (tomllib.TOMLDecodeError, RecursionError):
-        value = text if BARE_WORD.fullmatch(text) else None
+        value = text if text and (way in TEXTS or BARE_WORD.fullmatch(text)) else None
     if value is None:
         raise CaseError(
             file=SET,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -34,6 +34,15 @@ class Numbering:
     cells: NDArray[np.int32]
     file_cells: NDArray[np.int64]
     own_cells: NDArray[np.bool_]
+
+    def with_cell_order(self, order: NDArray) -> Numbering:
+        """The same with the cells in another order."""
+        return replace(
+            self,
+            cells=np.ascontiguousarray(self.cells[order]),
+            file_cells=self.file_cells[order],
+            own_cells=self.own_cells[order],
+        )
 
 
 def distribute(comm: MPI.Comm, cells: NDArray, total: int) -> Numbering:

@@ -65,6 +65,15 @@ class Newton:
         self._snes.destroy()
         self.matrix.destroy()
 
+    def prepare(self) -> None:
+        """Set the linear solver up on the undeformed body, so that every option has been asked for."""
+        x = self.assembly.reference_vector()
+        self._tangent(self._snes, x, self.matrix, self.matrix)
+        self.linear.ksp.setOperators(self.matrix)
+        self._snes.setUp()
+        self.linear.ksp.setUp()
+        x.destroy()
+
     def set_pseudo_time(self, s: float) -> None:
         """Loads as they are at s."""
         self._external = self.assembly.external_force(s)

@@ -1,0 +1,56 @@
+"""Large-deformation solids in absolute nodal coordinates, in parallel, on PETSc.
+
+import ancf_petsc as ancf
+case = ancf.load_case("cases/pvc_block").with_changes({"material.law": "neo_hooke"})
+run = ancf.run(case, "results/neo_hooke")
+print(run.curve["force"])
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from ancf_petsc.case.load import Case
+    from ancf_petsc.results.reader import Results
+
+# Names are looked up when they are used: importing the package costs nothing.
+_HOMES = {
+    "Case": "ancf_petsc.case.load",
+    "load_case": "ancf_petsc.case.load",
+    "case_from_dict": "ancf_petsc.case.load",
+    "Results": "ancf_petsc.results.reader",
+    "open_results": "ancf_petsc.results.reader",
+    "AncfError": "ancf_petsc.errors",
+    "CaseError": "ancf_petsc.errors",
+    "EnvironmentProblem": "ancf_petsc.errors",
+    "Interrupted": "ancf_petsc.errors",
+    "MeshError": "ancf_petsc.errors",
+    "NoEquilibrium": "ancf_petsc.errors",
+}
+__all__ = ["run", *_HOMES]
+
+
+def run(case: Case, folder: str | Path | None = None, *, force: bool = False) -> Results:
+    """Solve a case, on all ranks of the program, and open its results.
+
+    folder: where the results go, default results/NAME. force: overwrite a folder that holds something else.
+    Raises CaseError, NoEquilibrium, Interrupted.
+    """
+    from ancf_petsc.case.run import run_case
+    from ancf_petsc.results.reader import open_results
+
+    return open_results(run_case(case, folder, force=force))
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,35 @@
+"""Where the time of a run goes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+class Clock:
+    """Seconds spent in the parts of a run. A part inside another counts for itself only."""
+
+    PARTS = ("import", "read", "setup", "solve", "output")
+
+    def __init__(self, imports: float = 0.0) -> None:
+        self.seconds = dict.fromkeys(self.PARTS, 0.0)
+        self.seconds["import"] = imports
+        self._begun = time.perf_counter()
+        self._inner = [0.0]
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        """Count the time of a block under `name`."""
+        before = time.perf_counter()
+        self._inner.append(0.0)
+        try:
+            yield
+        finally:
+            spent = time.perf_counter() - before
+            self.seconds[name] += spent - self._inner.pop()
+            self._inner[-1] += spent
+
+    def report(self) -> dict[str, float]:
+        """Seconds by part, and in total, imports included."""
+        return {**self.seconds, "total": self.seconds["import"] + time.perf_counter() - self._begun}

@@ -1,0 +1,142 @@
+"""Running a case from its file to its results."""
+
+from __future__ import annotations
+
+import logging
+import resource
+from collections.abc import Callable
+from pathlib import Path
+
+from mpi4py import MPI
+
+from ancf_petsc.case.blueprint import Blueprint, draw, output_times
+from ancf_petsc.case.build import Built, build_from
+from ancf_petsc.case.clock import Clock
+from ancf_petsc.case.load import Case
+from ancf_petsc.case.quasi_static import QuasiStaticRun
+from ancf_petsc.case.record import Record
+from ancf_petsc.case.signals import StopRequest
+from ancf_petsc.case.versions import program_version, versions
+from ancf_petsc.errors import Interrupted
+from ancf_petsc.kernel.warmup import compile_kernels, is_compiled
+from ancf_petsc.log import log_file
+from ancf_petsc.material import law_named
+from ancf_petsc.parallel.exchange import agree, on_root
+from ancf_petsc.results.folder import check_folder, claim_folder, write_summary
+from ancf_petsc.solve.newton import Newton
+from ancf_petsc.solve.petsc import petsc_options, refuse_unused
+from ancf_petsc.system.assembly import Assembly
+
+log = logging.getLogger("ancf")
+
+
+def run_case(
+    case: Case,
+    folder: str | Path | None = None,
+    *,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    force: bool = False,
+    imports: float = 0.0,
+    watch: Callable[[float], None] = lambda done: None,
+) -> Path:
+    """Solve a case and leave its results in a folder, which is returned. Collective.
+
+    folder: default results/NAME. force: overwrite a folder that holds something else. imports: seconds spent before.
+    watch: told the part of the path done, 0 to 1. Raises CaseError, NoEquilibrium, Interrupted; what was computed
+    before is saved.
+    """
+    folder = Path(folder) if folder else Path("results") / case.name
+    clock = Clock(imports)
+    on_root(comm, lambda: check_folder(folder, case.spec.title, force=force))
+    with petsc_options(case.spec.petsc):
+        with clock.part("read"):
+            blueprint = on_root(comm, lambda: _read(case))
+        with clock.part("setup"):
+            _compile(case, comm)
+            built = build_from(case, blueprint, comm)
+            del blueprint
+            newton = Newton(Assembly(built.model), case.spec.statics.tolerance)
+            if case.spec.petsc:
+                newton.prepare()
+                agree(comm, lambda: refuse_unused(case.spec.petsc))
+        on_root(comm, lambda: claim_folder(folder))
+        with log_file(folder / "log.txt", comm.rank):
+            _solve(case, built, newton, folder, clock, watch)
+        newton.destroy()
+    return folder
+
+
+def _read(case: Case) -> Blueprint:
+    blueprint = draw(case)
+    for note in blueprint.mesh.notes:
+        log.warning("%s", note)
+    return blueprint
+
+
+def _compile(case: Case, comm: MPI.Comm) -> None:
+    """Compile the kernels on the root rank, so that the others load them."""
+    laws = [law_named(name) for name in sorted({material.law for material in case.spec.material})]
+    if comm.rank == 0 and not is_compiled(laws):
+        log.info("compiling kernels (%s): once, under half a minute", ", ".join(law.name for law in laws))
+    on_root(comm, lambda: compile_kernels(laws))
+
+
+def _solve(
+    case: Case, built: Built, newton: Newton, folder: Path, clock: Clock, watch: Callable[[float], None]
+) -> None:
+    """Follow the path; whatever happens, the summary says how it ended."""
+    comm = newton.comm
+    log.info("%s", describe(case, built, newton))
+    with clock.part("output"):
+        record = Record(folder, case.spec, built, newton.assembly, program_version())
+    stop = StopRequest(comm)
+    times = output_times(case.spec, case.file)
+    statics = case.spec.statics
+    run = QuasiStaticRun(newton, record, times, statics.smallest_step, clock, watch, stop.asked)
+    status = "stopped"
+    try:
+        with stop.watched(), clock.part("solve"):
+            run.go()
+        status = "done"
+    except Interrupted:
+        status = "interrupted"
+        raise
+    finally:
+        record.close()
+        _summarise(case, built, folder, status, clock, run, comm)
+
+
+def describe(case: Case, built: Built, newton: Newton) -> str:
+    """One paragraph on what is solved and how."""
+    laws = ", ".join(dict.fromkeys(region.law.title for region in built.model.regions))
+    return (
+        f"{case.spec.title}: {built.order.total_nodes} nodes, {built.order.total_cells} elements "
+        f"{case.spec.mesh.element}, {laws}, {newton.comm.size} rank{'s' * (newton.comm.size > 1)}; "
+        f"solver: {newton.linear.describe()}"
+    )
+
+
+def _summarise(
+    case: Case, built: Built, folder: Path, status: str, clock: Clock, run: QuasiStaticRun, comm: MPI.Comm
+) -> None:
+    memory = comm.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+    dof = built.model.dof
+    if comm.rank == 0:
+        write_summary(
+            folder,
+            title=case.spec.title,
+            status=status,
+            seconds=clock.report(),
+            memory_peak_bytes=memory,
+            nodes=built.order.total_nodes,
+            elements=built.order.total_cells,
+            dof=dof,
+            ranks=comm.size,
+            iterations={
+                "newton": run.totals["newton_iterations"],
+                "linear": run.totals["linear_iterations"],
+            },
+            final=run.record.row,
+            versions=versions(),
+            note=case.spec.note,
+        )
