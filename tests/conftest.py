@@ -1,0 +1,106 @@
+"""Programs started from tests: under mpiexec on several ranks, and the command line as a user types it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+PROJECT = Path(__file__).resolve().parent.parent
+Program = Callable[..., subprocess.CompletedProcess[str]]
+
+# The machine's load must not decide whether a test passes.
+settings.register_profile("project", deadline=None)
+settings.load_profile("project")
+
+
+@pytest.fixture(scope="session")
+def project() -> Path:
+    """The project's folder."""
+    return PROJECT
+
+
+@pytest.fixture(scope="session")
+def environment() -> dict[str, str]:
+    """Environment variables as scripts/environment.sh sets them, without what an MPI of this process left."""
+    shell = 'source "$0" && env -0'
+    command = ["bash", "-c", shell, str(PROJECT / "scripts" / "environment.sh")]
+    said = subprocess.run(command, env=dict(os.environ), check=True, capture_output=True, text=True).stdout
+    return dict(line.split("=", 1) for line in said.rstrip("\0").split("\0"))
+
+
+@pytest.fixture
+def mpirun(environment: dict[str, str], tmp_path: Path) -> Program:
+    """mpirun(n, args, timeout=120, code=0, cwd=tmp_path): this Python with `args` on n ranks.
+
+    Returns the completed process with stdout and stderr as text. Fails the test, with all that was printed,
+    on another exit code than `code` (None: any) or when it takes longer than `timeout` seconds.
+    """
+
+    def run(
+        n: int, args: Sequence[str | Path], timeout: float = 120, code: int | None = 0, cwd: Path = tmp_path
+    ) -> subprocess.CompletedProcess[str]:
+        return _run(["mpiexec", "-n", str(n), sys.executable, *args], environment, timeout, code, cwd)
+
+    return run
+
+
+@pytest.fixture
+def ancf(environment: dict[str, str], tmp_path: Path) -> Program:
+    """ancf(*args, ranks=None, timeout=120, code=0, cwd=tmp_path): the command line in a process of its own.
+
+    ranks: under mpiexec with that many; None: without mpiexec. Else as `mpirun`.
+    """
+
+    def run(
+        *args: str | Path,
+        ranks: int | None = None,
+        timeout: float = 120,
+        code: int | None = 0,
+        cwd: Path = tmp_path,
+    ) -> subprocess.CompletedProcess[str]:
+        launcher = [] if ranks is None else ["mpiexec", "-n", str(ranks)]
+        program = [sys.executable, "-m", "ancf_petsc", *args]
+        return _run([*launcher, *program], environment, timeout, code, cwd)
+
+    return run
+
+
+def _run(
+    command: Sequence[str | Path], environment: dict[str, str], timeout: float, code: int | None, cwd: Path
+) -> subprocess.CompletedProcess[str]:
+    words = [str(word) for word in command]
+    with subprocess.Popen(
+        words,
+        cwd=cwd,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            out, err = process.communicate(timeout=timeout)
+            problem = None if code in (None, process.returncode) else f"expected exit code {code}"
+        except subprocess.TimeoutExpired:
+            out, err = _stop(process)
+            problem = f"not done after {timeout:g} s"
+    if problem:
+        shown = f"{' '.join(words)}\nexit code {process.returncode}, {problem}"
+        pytest.fail(f"{shown}\n--- stdout\n{out}\n--- stderr\n{err}", pytrace=False)
+    return subprocess.CompletedProcess(words, process.returncode, out, err)
+
+
+def _stop(process: subprocess.Popen[str]) -> tuple[str, str]:
+    """End a program that hangs and return what it printed. mpiexec ends its ranks when asked politely."""
+    process.terminate()
+    try:
+        return process.communicate(timeout=10)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return process.communicate()
