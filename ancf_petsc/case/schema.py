@@ -182,7 +182,6 @@ class CaseSpec(Table):
     title: str = key('a title in quotes; such as title = "Block under compression"')
     units: str = key("a label in quotes; for plots, nothing is converted", "SI")
     note: str = key("a remark in quotes; it stands under every picture", "")
-    note: str = key("a remark in quotes; it stands wherever the results are shown", "")
     mesh: MeshSpec = key("a table [mesh]; with file and element")
     groups: dict[Name, GroupSpec] = key("a table [groups]; of choices by geometry", {})
     material: tuple[MaterialSpec, ...] = key("a table [material]; or several [[material]]")

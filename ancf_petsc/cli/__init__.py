@@ -1,7 +1,8 @@
 """The command `ancf`: one module a verb, imported when it is used.
 
-A verb's module has HELP (one line), add_arguments(parser) and execute(arguments), which returns the exit code.
-What follows `--` on the command line is in `arguments.petsc_options`, for verbs that have PETSC_OPTIONS = True.
+A verb's module has HELP (one line), add_arguments(parser) and execute(arguments), which returns the exit
+code. What follows `--` on the command line is in `arguments.petsc_options`, for verbs that have
+PETSC_OPTIONS = True.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from typing import IO, Any, NoReturn
+from typing import Any, NoReturn
 
-from ancf_petsc.errors import AncfError, CaseError, Interrupted, did_you_mean
+from ancf_petsc.errors import AncfError, CaseError, EnvironmentProblem, Interrupted, did_you_mean
 
 VERBS = {
     "run": ("ancf_petsc.cli.run", "solve a case"),
@@ -26,8 +27,9 @@ VERBS = {
     "mesh": ("ancf_petsc.cli.mesh", "make one of the project's meshes at a size"),
     "new": ("ancf_petsc.cli.new", "write a commented case to start from"),
 }
+ABOUT = "Large-deformation solids in absolute nodal coordinates, in parallel, on PETSc."
 EPILOG = """\
-exit codes: 0 done; 2 the input is wrong; 3 no equilibrium further on; 4 the environment is wrong; 130 interrupted
+exit codes: 0 done; 2 wrong input; 3 no equilibrium further on; 4 wrong environment; 130 interrupted
 in parallel: mpiexec -n 4 ancf run CASE; PETSc options follow --, as in: ancf run CASE -- -ksp_type cg
 ANCF_TRACEBACK=1 shows where an error comes from; ancf VERB --help has the options of a verb"""
 RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
@@ -45,6 +47,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return leave.code if isinstance(leave.code, int) else int(leave.code is not None)
     except AncfError as error:
         return _tell(error)
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("ancf_petsc"):
+            raise
+        cure = "run scripts/setup, or use environment.yml"
+        return _tell(EnvironmentProblem(f"the Python package {error.name} is missing; {cure}"))
     except KeyboardInterrupt:
         _abort_others(Interrupted.exit_code)
         return _tell(Interrupted("interrupted"))
@@ -55,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except Exception:
         if rank_count() == 1:
             raise
-        sys.excepthook(*sys.exc_info())  # type: ignore[arg-type]
+        sys.excepthook(*sys.exc_info())
         _abort_others(1)
         return 1
     return code
@@ -77,12 +84,12 @@ def _number(names: Sequence[str], default: int) -> int:
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser whose mistakes are CaseErrors of one line, and which speaks on the root rank only."""
+    """An argument parser whose mistakes are CaseErrors of one line, silent on other ranks than the root."""
 
     def error(self, message: str) -> NoReturn:
         raise CaseError(message, file=self.prog, cure=f"see {self.prog} --help")
 
-    def _print_message(self, message: str, file: IO[str] | None = None) -> None:
+    def _print_message(self, message: str, file: Any = None) -> None:
         if rank() == 0:
             super()._print_message(message, file)
 
@@ -122,8 +129,7 @@ def _top_parser() -> Parser:
     parser = Parser(
         prog="ancf",
         usage="ancf VERB ...",
-        description="Large-deformation solids in absolute nodal coordinates, in parallel, on PETSc.\n\nverbs:\n"
-        + verbs,
+        description=f"{ABOUT}\n\nverbs:\n{verbs}",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -154,7 +160,7 @@ def _unknown_verb(word: str) -> CaseError:
 def _tell(error: AncfError) -> int:
     """One line on stderr by the root rank; the exit code.
 
-    A rank that never met MPI leaves with 0: the launcher, seeing it fail first, would end the root before it spoke.
+    A rank that never met MPI leaves with 0: failing first, it would make the launcher end the root unheard.
     """
     if rank() == 0:
         if os.environ.get("ANCF_TRACEBACK", "") not in ("", "0"):
