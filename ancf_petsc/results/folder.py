@@ -112,7 +112,7 @@ def write_summary(
     versions: dict[str, str],
     **more: Any,
 ) -> None:
-    """Write summary.json; seconds has import, read, setup, solve, output and total, iterations newton and linear."""
+    """seconds: import, read, setup, solve, output, total; memory: per rank; iterations: newton, linear."""
     if status not in STATUSES:
         raise ValueError(f"status {status!r} is none of {STATUSES}")
     summary = {

@@ -32,7 +32,8 @@ class Results:
 
     title, units, note, kind: as the case and the mesh have them; kind is meshio's name of the cells.
     times: (steps,) pseudo-time of statics, time of motion, one an output.
-    fields: names of what every step holds, over nodes or over cells.
+    extras: attributes of every step.
+    fields: names of what every step holds: node_fields over nodes, cell_fields over cells.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -62,7 +63,9 @@ class Results:
         self._steps = sorted(steps, key=int)
         self.times = np.array([steps[name].attrs["time"] for name in self._steps], float)
         self.extras = [dict(steps[name].attrs) for name in self._steps]
-        self.fields = tuple(field_name(link) for link in steps[self._steps[0]]) if self._steps else ()
+        self.node_fields = tuple(map(str, steps.attrs.get("node_fields", ())))
+        self.cell_fields = tuple(map(str, steps.attrs.get("cell_fields", ())))
+        self.fields = self.node_fields + self.cell_fields
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -118,17 +121,12 @@ class Results:
             raise CaseError("no such field", file=self.path, got=name, cure=did_you_mean(name, self.fields))
         return self._dataset(f"steps/{self._steps[self._index(step)]}/{link_name(name)}")
 
-    def is_nodal(self, name: str) -> bool:
-        """Whether a field lives on nodes rather than on cells."""
-        with self._open() as file:
-            return file["steps"][self._steps[0]][link_name(name)].attrs["centre"] == "Node"
-
     def step_at(self, time: float) -> int:
         """The step nearest to a time."""
         return int(np.argmin(np.abs(self.times - time)))
 
     def mesh(self, step: int = -1, *, scale: float = 1.0) -> pyvista.UnstructuredGrid:
-        """The body at a step as pyvista sees it, displacements times `scale` (0: undeformed), with all fields."""
+        """The body at a step for pyvista, with all fields; displacements times `scale` (0: undeformed)."""
         import pyvista
 
         count, nodes = self.cells.shape
@@ -136,7 +134,7 @@ class Results:
         points = self.points + scale * self.field("displacement", step)
         grid = pyvista.UnstructuredGrid(connectivity, np.full(count, CELL_KINDS[self.kind].vtk), points)
         for name in self.fields:
-            data = grid.point_data if self.is_nodal(name) else grid.cell_data
+            data = grid.point_data if name in self.node_fields else grid.cell_data
             data[name] = self.field(name, step)
         return grid
 

@@ -7,6 +7,7 @@ its time and more as attributes. Rows are in the mesh file's order, one contiguo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -35,6 +36,24 @@ class Slab:
     start: int
     stop: int
     total: int
+
+
+@dataclass(frozen=True)
+class Table:
+    """A dataset, and this rank's rows of it."""
+
+    dataset: Dataset
+    rows: Array
+    slab: Slab
+
+    def __post_init__(self) -> None:
+        if (
+            len(self.rows) != self.slab.stop - self.slab.start
+            or self.rows.shape[1:] != self.dataset.shape[1:]
+        ):
+            raise ValueError(
+                f"{self.dataset.path}: rows {self.rows.shape} for {self.slab} of {self.dataset.shape}"
+            )
 
 
 class ResultStore:
@@ -71,44 +90,51 @@ class ResultStore:
         cell_numbers: Array,
         groups: Mapping[str, Array] | None = None,
     ) -> None:
-        """points (slab, 3), cells (slab, k) indices of all points, numbers (slab,); groups on the root rank only."""
+        """points (slab, 3), cells (slab, k) indices of points, numbers (slab,); groups: on the root rank."""
         self._nodes = self._slab(len(points))
         self._cells = self._slab(len(cells))
         groups = {name: np.asarray(nodes, np.int64) for name, nodes in (groups or {}).items()}
         sizes = self.comm.bcast({name: len(nodes) for name, nodes in groups.items()})
 
+        where = Dataset("/mesh/points", (self._nodes.total, 3))
+        topology = Dataset("/mesh/cells", (self._cells.total, *np.shape(cells)[1:]), integer=True)
+        tables = [
+            Table(where, np.ascontiguousarray(points, float), self._nodes),
+            Table(topology, np.ascontiguousarray(cells, np.int64), self._cells),
+            _numbers("/mesh/node_numbers", node_numbers, self._nodes),
+            _numbers("/mesh/cell_numbers", cell_numbers, self._cells),
+        ]
+        for name, size in sizes.items():
+            mine = groups.get(name, np.empty(0, np.int64))
+            tables.append(_numbers(f"/mesh/groups/{link_name(name)}", mine, Slab(0, len(mine), size)))
         with self._open() as file:
-            where = self._write(file, "/mesh/points", np.asarray(points, float), self._nodes)
-            topology = self._write(file, "/mesh/cells", np.asarray(cells, np.int64), self._cells)
-            self._write(file, "/mesh/node_numbers", np.asarray(node_numbers, np.int64), self._nodes)
-            self._write(file, "/mesh/cell_numbers", np.asarray(cell_numbers, np.int64), self._cells)
-            for name, size in sizes.items():
-                mine = groups.get(name, np.empty(0, np.int64))
-                slab = Slab(0, len(mine), size)
-                self._write(file, f"/mesh/groups/{link_name(name)}", mine, slab, moved=False)
             if file:
+                file.create_group("/mesh/groups")
+                file.create_group("/steps")
                 file["mesh"].attrs["kind"] = kind
-                file.require_group("/mesh/groups")
-                file.require_group("/steps")
+            self._write(file, tables)
         self._xdmf.set_mesh(kind, where, topology)
 
     def write_step(
         self, time: float, node_fields: Fields, cell_fields: Fields, extra: Mapping[str, Any] | None = None
     ) -> None:
-        """One output: fields (slab, ...) by name over nodes and cells; extra: attributes, the same on all ranks."""
+        """Fields (slab, ...) by name over nodes and cells; extra: attributes, the same on all ranks."""
         where = f"/steps/{self.steps:05d}"
-        fields = []
+        tables = [
+            _field(f"{where}/{link_name(name)}", rows, slab, centre)
+            for centre, slab, fields in (
+                ("Node", self._nodes, node_fields),
+                ("Cell", self._cells, cell_fields),
+            )
+            for name, rows in fields.items()
+        ]
         with self._open() as file:
             if file:
                 file.create_group(where).attrs.update({"time": time, **(extra or {})})
-            for centre, slab, group in (
-                ("Node", self._nodes, node_fields),
-                ("Cell", self._cells, cell_fields),
-            ):
-                for name, values in group.items():
-                    rows = _rows_of_components(values)
-                    fields.append(self._write(file, f"{where}/{link_name(name)}", rows, slab, centre=centre))
-        self._xdmf.add_step(float(time), fields)
+                if self.steps == 0:
+                    file["steps"].attrs.update({"node_fields": [*node_fields], "cell_fields": [*cell_fields]})
+            self._write(file, tables)
+        self._xdmf.add_step(float(time), [table.dataset for table in tables])
         with self._agreed():
             if self.comm.rank == 0:
                 self._xdmf.write()
@@ -130,51 +156,45 @@ class ResultStore:
                 file = h5py.File(self.path, mode, locking=False)
         try:
             yield file
-        finally:
-            with self._agreed():
-                if file:
-                    file.close()
-
-    def _write(
-        self,
-        file: h5py.File | None,
-        path: str,
-        rows: Array,
-        slab: Slab,
-        *,
-        centre: str = "Node",
-        moved: bool = True,
-    ) -> Dataset:
-        """A dataset from one slab a rank; moved: the root rank takes the others' where it alone writes."""
-        if len(rows) != slab.stop - slab.start:
-            raise ValueError(f"{path}: {len(rows)} rows for a slab of {slab.stop - slab.start}")
-        rows = np.ascontiguousarray(rows)
-        shape = (slab.total, *rows.shape[1:])
+        except EnvironmentProblem:  # of all ranks; any other error is of this one alone, and closing waits
+            if file:
+                file.close()
+            raise
         with self._agreed():
-            data = file.create_dataset(path, shape, rows.dtype) if file else None
-            if data is not None:
-                data.attrs["centre"] = centre
-        with self._agreed():
-            if data is not None and len(rows):
-                data[slab.start : slab.stop] = (
-                    rows  # independent: h5py skips an empty rank's collective write
-                )
-        if moved and not self.parallel:
-            self._move_to_root(data, rows, slab)
-        return Dataset(path, shape, integer=rows.dtype.kind == "i", centre=centre)
+            if file:
+                file.close()
 
-    def _move_to_root(self, data: h5py.Dataset | None, rows: Array, slab: Slab) -> None:
-        """One slab after the other, so that the root rank never holds the whole table."""
-        for rank in range(1, self.comm.size):
-            start, stop = self.comm.bcast((slab.start, slab.stop), rank)
-            if self.comm.rank == rank:
-                self.comm.Send(rows, 0)
-            elif self.comm.rank == 0:
-                theirs = np.empty((stop - start, *rows.shape[1:]), rows.dtype)
-                self.comm.Recv(theirs, rank)
+    def _write(self, file: h5py.File | None, tables: list[Table]) -> None:
+        """Make all datasets, which is collective, then write slabs, which is not."""
+        with self._agreed():
+            made = [_create(file, table) for table in tables] if file else []
+        with self._agreed():
+            if file:
+                for data, table in zip(made, tables, strict=True):
+                    _write_rows(data, table.slab.start, table.rows)
+        if not self.parallel:
             with self._agreed():
-                if data is not None and stop > start:
-                    data[start:stop] = theirs
+                self._move_to_root(made, tables)
+
+    def _move_to_root(self, made: list[h5py.h5d.DatasetID], tables: list[Table]) -> None:
+        """One slab after the other, so that the root rank never holds a whole table."""
+        problem: OSError | RuntimeError | None = None
+        for index, table in enumerate(tables):
+            for rank in range(1, self.comm.size):
+                if self.comm.rank == rank:
+                    self.comm.send((table.slab.start, len(table.rows)), 0)
+                    self.comm.Send(table.rows, 0)
+                if self.comm.rank:
+                    continue
+                start, count = self.comm.recv(source=rank)
+                rows = np.empty((count, *table.rows.shape[1:]), table.rows.dtype)
+                self.comm.Recv(rows, rank)
+                try:
+                    _write_rows(made[index], start, rows)
+                except (OSError, RuntimeError) as error:
+                    problem = problem or error  # the others still send: take it all, then tell
+        if problem:
+            raise problem
 
     @contextmanager
     def _agreed(self) -> Iterator[None]:
@@ -189,7 +209,27 @@ class ResultStore:
             raise EnvironmentProblem(f"{self.path}: cannot be written: {reason}; look for space on the disk")
 
 
-def _rows_of_components(rows: Array) -> Array:
+def _field(path: str, rows: Array, slab: Slab, centre: str) -> Table:
     """(m,), (m, 3) as they are; (m, 3, 3) as (m, 9)."""
-    rows = np.asarray(rows, float)
-    return rows.reshape(len(rows), -1) if rows.ndim > 2 else rows
+    rows = np.ascontiguousarray(rows, float)
+    rows = rows.reshape(len(rows), math.prod(rows.shape[1:])) if rows.ndim > 2 else rows
+    return Table(Dataset(path, (slab.total, *rows.shape[1:]), centre=centre), rows, slab)
+
+
+def _numbers(path: str, rows: Array, slab: Slab) -> Table:
+    return Table(Dataset(path, (slab.total,), integer=True), np.ascontiguousarray(rows, np.int64), slab)
+
+
+def _create(file: h5py.File, table: Table) -> h5py.h5d.DatasetID:
+    """h5py's low-level calls: half the time of its datasets, which counts where steps are many and small."""
+    kind = h5py.h5t.py_create(table.rows.dtype)
+    space = h5py.h5s.create_simple(table.dataset.shape)
+    return h5py.h5d.create(file.id, table.dataset.path.encode(), kind, space)
+
+
+def _write_rows(data: h5py.h5d.DatasetID, start: int, rows: Array) -> None:
+    if len(rows) == 0:
+        return
+    space = data.get_space()
+    space.select_hyperslab((start, *(0,) * (rows.ndim - 1)), rows.shape)
+    data.write(h5py.h5s.create_simple(rows.shape), space, rows)

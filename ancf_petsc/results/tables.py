@@ -53,7 +53,7 @@ class Table:
 
 
 def _exact(value: float) -> str:
-    """Whole numbers as they are; others in 17 significant digits at most, as many as give them back exactly."""
+    """Whole numbers as they are; others by the digits, 17 at most, that give them back exactly."""
     if isinstance(value, int | np.integer):
         return str(int(value))
     return repr(float(value))

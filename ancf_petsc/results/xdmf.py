@@ -89,8 +89,9 @@ class Xdmf:
     def set_mesh(self, kind: str, points: Dataset, cells: Dataset) -> None:
         cell_kind = CELL_KINDS[kind]
         count, nodes = cells.shape
+        size = f'NumberOfElements="{count}" NodesPerElement="{nodes}"'
         self.mesh = (
-            f'<Topology TopologyType="{cell_kind.topology}" NumberOfElements="{count}" NodesPerElement="{nodes}">'
+            f'<Topology TopologyType="{cell_kind.topology}" {size}>'
             f"{cells.item(self.data_file)}</Topology>\n"
             f'<Geometry GeometryType="XYZ">{points.item(self.data_file)}</Geometry>\n'
         )
