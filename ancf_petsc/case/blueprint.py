@@ -162,8 +162,9 @@ class _Drawer:
         rest = next((i for i, spec in enumerate(self.spec.material) if spec.group is None), None)
         left = np.flatnonzero(material < 0)
         if len(left) and rest is None:
+            first = self.mesh.cell_numbers[left[0]]
             raise CaseError(
-                f"{len(left)} elements have no material, the first is element {self.mesh.cell_numbers[left[0]]}",
+                f"{len(left)} elements have no material, the first is element {first}",
                 file=self.file,
                 key="material",
                 expected="a material for every element",

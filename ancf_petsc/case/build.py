@@ -110,7 +110,9 @@ def _enter_cells(case: Case, plan: Blueprint | None, model: Model) -> None:
     comm, numbering = model.comm, model.numbering
     total = comm.bcast(len(plan.cells) if plan else None)
     bounds = slab_bounds(total, comm.size)
-    both = None if plan is None else np.stack((plan.material.astype(np.int64), plan.mesh.cell_numbers), axis=1)
+    both = (
+        None if plan is None else np.stack((plan.material.astype(np.int64), plan.mesh.cell_numbers), axis=1)
+    )
     attributes = lookup(comm, bounds, scatter_rows(comm, both), numbering.file_cells)
     order = np.lexsort((np.arange(len(attributes)), ~numbering.own_cells, attributes[:, 0]))
     numbering = numbering.with_cell_order(order)

@@ -12,19 +12,21 @@ from petsc4py import PETSc
 from ancf_petsc.case.clock import Clock
 from ancf_petsc.case.record import Record
 from ancf_petsc.errors import Interrupted, NoEquilibrium
+from ancf_petsc.log import STEPS
 from ancf_petsc.solve.newton import Newton
 from ancf_petsc.solve.statics import LoadPath, Step
 from ancf_petsc.system.measures import conjugates
 from ancf_petsc.system.work import PathWork
 
-log = logging.getLogger("ancf")
+log = logging.getLogger(STEPS)
 COUNTS = ("newton_iterations", "linear_iterations", "steps")
 
 
 class QuasiStaticRun:
     """Follows the load path and records it.
 
-    times: pseudo-times of the outputs. watch: told the part of the path done, 0 to 1. stop: whether to end after this step.
+    times: pseudo-times of the outputs. watch: told the part of the path done, 0 to 1. stop: asked after each
+    step whether to end.
     """
 
     def __init__(

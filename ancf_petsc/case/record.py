@@ -60,7 +60,9 @@ class Record:
         strain, cauchy, det = self.assembly.fields(x)
         row = {**time, **self.curve(x, out_of_balance), **self._stress_force(cauchy)}
         row |= self._energies(x, more) | {"min_det_F": self.comm.allreduce(det.min(initial=np.inf), MPI.MIN)}
-        row |= {name: value for name, value in more.items() if name not in row} | self._reactions(out_of_balance)
+        row |= {name: value for name, value in more.items() if name not in row} | self._reactions(
+            out_of_balance
+        )
         self._append("curve.csv", row)
         if self.spec.probe:
             self._append("probes.csv", {**time, **self._probes(x)})
@@ -70,7 +72,10 @@ class Record:
         (now,) = time.values()
         self._store.write_step(
             now,
-            {name: self._nodes(rows, self._blank(self.built.order.points, rows)) for name, rows in nodes.items()},
+            {
+                name: self._nodes(rows, self._blank(self.built.order.points, rows))
+                for name, rows in nodes.items()
+            },
             {
                 name: self._cells(rows[self._own_cells], self._blank(self.built.order.cells, rows))
                 for name, rows in cells.items()

@@ -1,0 +1,119 @@
+"""`ancf check`: validates a case, prints what it would solve, and solves nothing."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from ancf_petsc.cli.run import add_case_arguments, changes
+
+if TYPE_CHECKING:
+    from ancf_petsc.case.blueprint import Blueprint
+    from ancf_petsc.case.load import Case
+
+HELP = "check a case and its mesh, solve nothing"
+PETSC_OPTIONS = True
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_case_arguments(parser)
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    from mpi4py import MPI
+
+    from ancf_petsc.case.blueprint import draw
+    from ancf_petsc.case.load import load_case
+    from ancf_petsc.parallel.exchange import on_root
+
+    comm = MPI.COMM_WORLD
+
+    def show() -> None:
+        case = load_case(arguments.case, changes(arguments), arguments.petsc_options)
+        blueprint = draw(case)
+        _print_mesh(blueprint)
+        _print_case(case, blueprint)
+        print("the case is good")
+
+    on_root(comm, show)
+    return 0
+
+
+def _print_mesh(blueprint: Blueprint) -> None:
+    from ancf_petsc.cli.console import show_facts, show_table
+    from ancf_petsc.mesh.check import statistics
+
+    mesh = blueprint.mesh
+    found = statistics(mesh)
+    worst = f"worst {found.worst_quality:.3f} in element {found.worst_cell}"
+    low, high = found.box
+    unused = f", {found.unused_nodes} of them in no element" if found.unused_nodes else ""
+    show_facts(
+        [
+            ("mesh", mesh.source),
+            ("nodes", f"{found.nodes}{unused}"),
+            ("elements", f"{found.cells} of {blueprint.element.code}"),
+            ("pieces", found.pieces),
+            ("box", " x ".join(f"[{a:.6g}, {b:.6g}]" for a, b in zip(low, high, strict=True))),
+            ("volume", found.volume),
+            ("edges", f"{found.shortest_edge:.4g} to {found.longest_edge:.4g}"),
+            ("quality (mean ratio)", f"{worst}, mean {found.mean_quality:.3f}"),
+            *(("note", note) for note in mesh.notes),
+        ]
+    )
+    rows = [
+        [
+            name,
+            group.nodes,
+            *(group.parts.get(d) for d in (1, 2, 3)),
+            *(group.measures.get(d) for d in (1, 2, 3)),
+        ]
+        for name, group in found.groups.items()
+    ]
+    show_table(["group", "nodes", "lines", "faces", "elements", "length", "area", "volume"], rows)
+
+
+def _print_case(case: Case, blueprint: Blueprint) -> None:
+    import numpy as np
+
+    from ancf_petsc.case.memory import memory_estimate
+    from ancf_petsc.cli.console import show_facts
+
+    spec = case.spec
+    dof = 3 * len(blueprint.nodes)
+    driven = int((blueprint.constraints.motion >= 0).sum())
+    facts: list[tuple[str, object]] = [
+        ("case", spec.title),
+        ("analysis", _analysis(case)),
+        ("degrees of freedom", f"{dof}, {driven} of them held or moved"),
+        ("memory", f"about {memory_estimate(len(blueprint.cells), dof) / 1e9:.2g} GB over all ranks"),
+    ]
+    counts = np.bincount(blueprint.material, minlength=len(spec.material))
+    for material, count in zip(spec.material, counts, strict=True):
+        density = f", density {material.density:g}" if material.density else ""
+        moduli = f"young {material.young:g}, poisson {material.poisson:g}"
+        text = f"{material.law}, {moduli}{density}: {count} elements"
+        facts.append(("material", text))
+    for constraint in spec.constraint:
+        held = list(constraint.fix)
+        moved = [f"{axis} by {amount:g}" for axis, amount in constraint.move.items()]
+        words = (["holds " + ", ".join(held)] if held else []) + (
+            ["moves " + ", ".join(moved)] if moved else []
+        )
+        nodes = int(blueprint.members[constraint.group].sum())
+        facts.append(("constraint", f"{constraint.group}, {nodes} nodes: {'; '.join(words)}"))
+    for load in spec.load:
+        what = load.acceleration if load.type == "gravity" else (load.group, load.total)
+        facts.append(("load", f"{load.type} {what}"))
+    show_facts(facts)
+
+
+def _analysis(case: Case) -> str:
+    from ancf_petsc.case.blueprint import output_times
+
+    if case.spec.statics:
+        return f"statics, {len(output_times(case.spec, case.file))} outputs after the start"
+    motion = case.spec.dynamics
+    return (
+        f"dynamics by {motion.integrator} over {motion.duration:g}, {motion.outputs} outputs after the start"
+    )

@@ -1,0 +1,128 @@
+"""`ancf info`: versions, what PETSc can do, the elements; a short self-check on 1 and 2 ranks."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+HELP = "versions, elements, and a 10-second self-check on 1 and 2 ranks"
+PACKAGES = ("mumps", "hypre", "ml", "ptscotch", "parmetis", "superlu_dist", "suitesparse")
+STRETCH = 0.9
+CASE = """
+title = "Self-check: a cube pressed by a tenth between smooth plates"
+[mesh]
+file = "cube.msh"
+element = "3413"
+[groups]
+west = { plane = "x", at = "min" }
+south = { plane = "y", at = "min" }
+low = { plane = "z", at = "min" }
+high = { plane = "z", at = "max" }
+[material]
+law = "svk"
+young = 1.0
+poisson = 0.3
+[[constraint]]
+group = "west"
+fix = ["x"]
+[[constraint]]
+group = "south"
+fix = ["y"]
+[[constraint]]
+group = "low"
+fix = ["z"]
+[[constraint]]
+group = "high"
+move = { z = -0.01 }
+[statics]
+steps = 2
+[output]
+curve = { force = "high.z", stroke = "high.z" }
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--elements", action="store_true", help="print the catalogue of elements and stop")
+    parser.add_argument("--no-check", action="store_true", help="leave the self-check out")
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    from ancf_petsc.cli.console import show_table
+
+    if arguments.elements:
+        from ancf_petsc.element.catalog import table
+
+        rows = table()
+        show_table(list(rows[0]), [list(row.values()) for row in rows])
+        return 0
+    _print_versions()
+    return 0 if arguments.no_check or _self_check() else 4
+
+
+def _print_versions() -> None:
+    from petsc4py import PETSc
+
+    from ancf_petsc.case.versions import versions
+    from ancf_petsc.cli.console import show_facts
+    from ancf_petsc.kernel.compiled import CACHE_FOLDER
+
+    there = [name for name in PACKAGES if PETSc.Sys.hasExternalPackage(name)]
+    show_facts(
+        [*versions().items(), ("petsc packages", ", ".join(there)), ("compiled kernels", str(CACHE_FOLDER))],
+    )
+
+
+def _self_check() -> bool:
+    """Compress a cube between smooth plates on 1 and 2 ranks: uniaxial stress, known exactly on any mesh."""
+    from ancf_petsc.mesh.generate import make_mesh
+
+    exact = 0.05**2 * (STRETCH**3 - STRETCH) / 2
+    good = True
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        make_mesh("cube", folder / "cube.msh", divisions=(3, 3, 6))
+        (folder / "case.toml").write_text(CASE)
+        for ranks in (1, 2):
+            begun = time.perf_counter()
+            problem, error = _solve(folder, ranks, exact)
+            words = (
+                problem or f"force off by {error:.1e} of the exact one, {time.perf_counter() - begun:.1f} s"
+            )
+            passed = not problem and error < 1e-9
+            print(f"self-check on {ranks} rank{'s' * (ranks > 1)}: {'good' if passed else 'FAILED'}: {words}")
+            good = good and passed
+    return good
+
+
+def _environment() -> dict[str, str]:
+    """The environment for two ranks on any machine: containers run as root and may have one core."""
+    allowed = {"OMP_NUM_THREADS": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
+    if os.geteuid() == 0:
+        allowed |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    return {**os.environ, **allowed}
+
+
+def _solve(folder: Path, ranks: int, exact: float) -> tuple[str, float]:
+    """What went wrong, if anything, and the relative error of the last force."""
+    from ancf_petsc.results.reader import open_results
+
+    launcher = shutil.which("mpiexec")
+    if ranks > 1 and launcher is None:
+        return "mpiexec was not found: install Open MPI or MPICH", 1.0
+    start = [str(launcher), "-n", str(ranks)] if ranks > 1 else []
+    out = folder / f"run{ranks}"
+    command = [*start, sys.executable, "-m", "ancf_petsc", "run", str(folder), "--out", str(out)]
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=300, check=False, env=_environment()
+    )
+    if done.returncode:
+        lines = [line for line in done.stderr.splitlines() if any(c.isalnum() for c in line)]
+        return lines[0] if lines else f"exit code {done.returncode}", 1.0
+    force = open_results(out).curve["force"][-1]
+    return "", abs(force / exact - 1.0)
