@@ -12,24 +12,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME", nargs="?", help="which body; --list shows them")
     parser.add_argument("--size", type=float, metavar="H", help="length of edges in metres, meshed by Gmsh")
     parser.add_argument(
-        "--divisions", type=int, nargs=3, metavar=("NX", "NY", "NZ"), help="bricks of six tetrahedra along x, y, z"
+        "--divisions",
+        type=int,
+        nargs=3,
+        metavar=("NX", "NY", "NZ"),
+        help="bricks of six tetrahedra along x, y, z",
     )
     parser.add_argument("--hexahedra", action="store_true", help="leave the bricks whole")
-    parser.add_argument("--order", type=int, default=1, metavar="1|2", help="2: quadratic tetrahedra (default 1)")
-    parser.add_argument("--format", default="2.2", metavar="2.2|4.1", help="version of the .msh file (default 2.2)")
+    parser.add_argument(
+        "--order", type=int, default=1, metavar="1|2", help="2: quadratic tetrahedra (default 1)"
+    )
+    parser.add_argument(
+        "--format", default="2.2", metavar="2.2|4.1", help="version of the .msh file (default 2.2)"
+    )
     parser.add_argument("--out", type=Path, metavar="FILE", help="the file to write (default NAME.msh)")
     parser.add_argument("--list", action="store_true", help="list the bodies and stop")
 
 
 def execute(arguments: argparse.Namespace) -> int:
-    from ..errors import CaseError
-    from ..mesh.generate import MODELS, make_mesh
+    from ancf_petsc.errors import CaseError
+    from ancf_petsc.mesh.bodies import BODIES
+    from ancf_petsc.mesh.generate import make_mesh
 
     if arguments.list:
-        _print_models()
+        _print_bodies()
         return 0
     if arguments.name is None:
-        raise CaseError("which mesh?", key="NAME", expected=f"one of {', '.join(MODELS)}", cure="ancf mesh --list")
+        raise CaseError(
+            "which mesh?", key="NAME", expected=f"one of {', '.join(BODIES)}", cure="ancf mesh --list"
+        )
     path = make_mesh(
         arguments.name,
         arguments.out or Path(f"{arguments.name}.msh"),
@@ -43,34 +54,29 @@ def execute(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _print_models() -> None:
-    from rich.console import Console
-    from rich.table import Table
+def _print_bodies() -> None:
+    from ancf_petsc.mesh.bodies import BODIES
 
-    from ..mesh.generate import MODELS
-
-    table = Table("name", "body", "groups", "default size", "default divisions", box=None)
-    for name, model in MODELS.items():
-        groups = ", ".join([*model.faces, *model.edges, "solid"])
-        table.add_row(name, model.about, groups, f"{model.size:g}", " ".join(map(str, model.divisions)))
-    Console().print(table)
+    for name, body in BODIES.items():
+        divisions = " ".join(map(str, body.divisions))
+        print(f"{name}: {body.about}")
+        print(f"  groups {', '.join([*body.faces, *body.edges, 'solid'])}")
+        print(f"  --size {body.size:g} (default), or --divisions, as in {divisions}")
 
 
 def _print_mesh(path: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from ..mesh.check import statistics
-    from ..mesh.read import read_mesh
+    from ancf_petsc.mesh.check import statistics
+    from ancf_petsc.mesh.read import read_mesh
 
     found = statistics(read_mesh(path, ("tetra", "tetra10", "hexahedron")))
     console = Console(highlight=False)
     console.print(f"{found.nodes} nodes, {found.cells} {found.kind} cells, volume {found.volume:.6g}")
-    console.print(
-        f"quality (mean ratio): worst {found.worst_quality:.3f} in cell {found.worst_cell}, mean {found.mean_quality:.3f}; "
-        f"edges {found.shortest_edge:.4g} to {found.longest_edge:.4g}",
-        soft_wrap=True,
-    )
+    worst = f"worst {found.worst_quality:.3f} in cell {found.worst_cell}"
+    console.print(f"quality (mean ratio): {worst}, mean {found.mean_quality:.3f}")
+    console.print(f"edges {found.shortest_edge:.4g} to {found.longest_edge:.4g}")
     table = Table("group", "nodes", "lines", "faces", "cells", "size", box=None)
     for name, group in found.groups.items():
         counts = [str(group.parts.get(dimension, "")) for dimension in (1, 2, 3)]

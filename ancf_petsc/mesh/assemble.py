@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import MeshError
-from .coincident import TOLERANCE, coincident_pairs, representatives
-from .kinds import KINDS, Kind, determinants, edge_lengths, part_kind
-from .mesh import Floats, Group, Integers, Mesh
-from .parts import row_keys, unique_rows
-from .raw import Block, RawMesh, mesh_error
+from ancf_petsc.errors import MeshError
+from ancf_petsc.mesh.coincident import TOLERANCE, coincident_pairs, representatives
+from ancf_petsc.mesh.kinds import KINDS, Kind, determinants, edge_lengths, part_kind
+from ancf_petsc.mesh.mesh import Floats, Group, Integers, Mesh
+from ancf_petsc.mesh.parts import row_keys, unique_rows
+from ancf_petsc.mesh.raw import Block, RawMesh, mesh_error
 
 FLAT = 1e-12
 """Cells whose determinant is smaller than this times (longest edge)^dimension are flat."""
@@ -65,7 +65,9 @@ def _sorted_nodes(raw: RawMesh, path: Path) -> tuple[Integers, Floats]:
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
         place = _place(points[bad[0]])
-        raise wrong(f"{len(bad)} nodes have coordinates that are not finite, first node {numbers[bad[0]]} at {place}")
+        raise wrong(
+            f"{len(bad)} nodes have coordinates that are not finite, first node {numbers[bad[0]]} at {place}"
+        )
     return numbers, points
 
 
@@ -97,10 +99,14 @@ def _wrong_cells(
     expected = f"{wanted} cells for element {element}"
     listing = ", ".join(f"{count} {kind}" for kind, count in sorted(counts.items()))
     if len(counts) > 1:
-        return wrong(f"mixed cells: found {listing}, expected only {expected}", cure="mesh with one kind of cell")
+        return wrong(
+            f"mixed cells: found {listing}, expected only {expected}", cure="mesh with one kind of cell"
+        )
     if counts:
         (kind,) = counts
-        return wrong(f"found {listing}, expected {expected}", cure=ASK_FOR.get(kind, f"mesh with {wanted} cells"))
+        return wrong(
+            f"found {listing}, expected {expected}", cure=ASK_FOR.get(kind, f"mesh with {wanted} cells")
+        )
     lower: dict[str, int] = {}
     for block in blocks:
         lower[block.kind] = lower.get(block.kind, 0) + len(block.numbers)
@@ -115,19 +121,24 @@ def _indices(block: Block, numbering: Numbering, path: Path) -> Integers:
     bad = np.argwhere(nodes < 0)
     if len(bad):
         row, column = bad[0]
+        node = block.nodes[row, column]
         raise mesh_error(path)(
-            f"{block.kind} {block.numbers[row]} refers to node {block.nodes[row, column]}, which the file does not hold",
+            f"{block.kind} {block.numbers[row]} refers to node {node}, which the file does not hold",
             cure="write the mesh again with all its nodes",
         )
     return nodes
 
 
-def _cells(blocks: list[Block], numbering: Numbering, path: Path) -> tuple[Integers, Integers, dict[str, Integers]]:
+def _cells(
+    blocks: list[Block], numbering: Numbering, path: Path
+) -> tuple[Integers, Integers, dict[str, Integers]]:
     """Numbers (e,) ascending, cells (e, k), group name -> its cells; a cell listed twice is one cell."""
     numbers = np.concatenate([block.numbers for block in blocks])
     nodes = np.concatenate([_indices(block, numbering, path) for block in blocks])
     order = np.argsort(numbers, kind="stable")
-    _, first, same = np.unique(row_keys(nodes[order], len(numbering.numbers)), return_index=True, return_inverse=True)
+    _, first, same = np.unique(
+        row_keys(nodes[order], len(numbering.numbers)), return_index=True, return_inverse=True
+    )
     kept = np.sort(first)
     cell_of = np.empty(len(order), dtype=np.int64)
     cell_of[order] = np.searchsorted(kept, first)[same]
@@ -181,8 +192,9 @@ def _merge(mesh: Mesh, numbering: Numbering, pairs: Integers, path: Path) -> Non
     row = np.sort(mesh.cells, axis=1)
     collapsed = np.flatnonzero((row[:, 1:] == row[:, :-1]).any(axis=1))
     if len(collapsed):
+        first = mesh.cell_numbers[collapsed[0]]
         raise wrong(
-            f"merging nodes collapses {len(collapsed)} elements, first element {mesh.cell_numbers[collapsed[0]]}",
+            f"merging nodes collapses {len(collapsed)} elements, first element {first}",
             cure="mend the mesh: it has edges of no length",
         )
     keys = row_keys(mesh.cells, len(mesh.points))
@@ -207,11 +219,12 @@ def _orient(mesh: Mesh, kind: Kind, path: Path) -> None:
         negative = worst > FLAT
     flat = (worst <= FLAT) & (best >= -FLAT)
     first = np.flatnonzero(negative | flat)[0]
-    centre = _place(mesh.points[mesh.cells[first, : kind.corners]].mean(axis=0))
+    centroid = _place(mesh.points[mesh.cells[first, : kind.corners]].mean(axis=0))
+    which = f"first element {mesh.cell_numbers[first]} with centroid {centroid}"
     counts = [(np.count_nonzero(negative), "inverted"), (np.count_nonzero(flat), "flat or twisted")]
     listing = " and ".join(f"{count} {what}" for count, what in counts if count)
     raise mesh_error(path)(
-        f"{listing} of {len(negative)} elements, first element {mesh.cell_numbers[first]} with centroid {centre}",
+        f"{listing} of {len(negative)} elements, {which}",
         cure="mend the mesh: all elements must have the same orientation and a volume",
     )
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .groups import measure
-from .kinds import KINDS, edge_lengths, part_sizes, qualities
-from .mesh import Floats, Integers, Mesh
+from ancf_petsc.mesh.groups import measure
+from ancf_petsc.mesh.kinds import KINDS, edge_lengths, part_sizes, qualities
+from ancf_petsc.mesh.mesh import Floats, Integers, Mesh
 
 
 @dataclass(frozen=True)
@@ -76,14 +76,18 @@ def _group_statistics(mesh: Mesh, name: str) -> GroupStatistics:
     return GroupStatistics(
         nodes=len(group.nodes),
         parts={dimension: len(parts) for dimension, parts in group.parts.items()},
-        measures={dimension: measure(mesh, dimension, parts) for dimension, parts in group.parts.items() if dimension},
+        measures={
+            dimension: measure(mesh, dimension, parts)
+            for dimension, parts in group.parts.items()
+            if dimension
+        },
     )
 
 
 def connected_pieces(cells: Integers, n_points: int) -> tuple[int, Integers]:
-    """How many pieces cells (e, k) form through shared nodes, and the piece of each point (n,), -1 for unused.
+    """How many pieces cells (e, k) form through shared nodes, and the piece of each point (n,).
 
-    Pieces are numbered by their lowest point.
+    Pieces are numbered by their lowest point; points no cell uses are in piece -1.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components

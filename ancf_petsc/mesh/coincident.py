@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .mesh import Floats, Integers
+from ancf_petsc.mesh.mesh import Floats, Integers
 
 TOLERANCE = 1e-9
 """Nodes closer than this times the mesh size coincide."""

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .kinds import BY_GMSH
-from .mesh import Floats, Integers
-from .raw import Block, RawMesh, mesh_error
+from ancf_petsc.mesh.kinds import BY_GMSH
+from ancf_petsc.mesh.mesh import Floats, Integers
+from ancf_petsc.mesh.raw import Block, RawMesh, mesh_error
 
 CURE = "the file may be truncated or damaged: write it again"
 
@@ -78,9 +78,13 @@ def read_gmsh(path: Path) -> RawMesh:
 def _checked_header(data: mmap.mmap, path: Path) -> Header:
     """The header of a file whose sections are whole; an error where one is missing or unfinished."""
     wrong = mesh_error(path)
-    start = re.match(rb"\s*(?:\$Comments.*?\$EndComments\s*)?\$(MeshFormat|NOD)\s*?\n(.*?)\n", data, re.DOTALL)
+    start = re.match(
+        rb"\s*(?:\$Comments.*?\$EndComments\s*)?\$(MeshFormat|NOD)\s*?\n(.*?)\n", data, re.DOTALL
+    )
     if start is None:
-        raise wrong("not a Gmsh mesh: it does not begin with $MeshFormat", cure="write it again as .msh 2.2 or 4.1")
+        raise wrong(
+            "not a Gmsh mesh: it does not begin with $MeshFormat", cure="write it again as .msh 2.2 or 4.1"
+        )
     for section, old in (("Nodes", "NOD"), ("Elements", "ELM")):
         begun = data.find(b"$%b" % section.encode()) >= 0 or data.find(b"$%b" % old.encode()) >= 0
         ended = data.find(b"$End%b" % section.encode()) >= 0 or data.find(b"$END%b" % old.encode()) >= 0
@@ -90,17 +94,24 @@ def _checked_header(data: mmap.mmap, path: Path) -> Header:
     if not re.search(rb"\$End\w+\s*\Z", data[-200:], re.IGNORECASE):
         raise wrong("the file ends inside a section", cure=CURE)
     if start[1] == b"NOD":
-        return Header(1, False, "<")
+        return Header(1, binary=False, order="<")
     header = re.fullmatch(r"(\d+(?:\.\d+)?)\s+([01])\s+\d+", start[2].decode("latin-1").strip())
     if header is None:
-        raise wrong("the line after $MeshFormat is none", got=start[2].decode("latin-1"), expected="like 4.1 0 8", cure=CURE)
+        raise wrong(
+            "the line after $MeshFormat is none",
+            got=start[2].decode("latin-1"),
+            expected="like 4.1 0 8",
+            cure=CURE,
+        )
     return Header(float(header[1]), header[2] == "1", "<" if data[start.end()] == 1 else ">")
 
 
 def _physical_names(data: mmap.mmap) -> dict[tuple[int, int], str]:
     """(dimension, tag) -> name, in the order of the file."""
     section = re.search(rb"\$PhysicalNames\s(.*?)\$EndPhysicalNames", data, re.DOTALL)
-    entries = re.findall(r'(\d+)\s+(-?\d+)\s+"([^"\n]*)"', section[1].decode("utf-8", "replace")) if section else []
+    entries = (
+        re.findall(r'(\d+)\s+(-?\d+)\s+"([^"\n]*)"', section[1].decode("utf-8", "replace")) if section else []
+    )
     return {(int(dimension), abs(int(tag))): name for dimension, tag, name in entries}
 
 
@@ -147,7 +158,7 @@ def _blocks(gmsh: Any, membership: dict[tuple[int, int], list[str]]) -> list[Blo
     for dimension, entity in gmsh.model.getEntities():
         names = tuple(dict.fromkeys(membership.get((dimension, abs(entity)), ())))
         kinds, numbers, nodes = gmsh.model.mesh.getElements(dimension, entity)
-        for kind, cells, corners in zip(kinds, numbers, nodes):
+        for kind, cells, corners in zip(kinds, numbers, nodes, strict=True):
             corners = corners.astype(np.int64).reshape(len(cells), -1)
             known = BY_GMSH.get(kind)
             if known and known.gmsh_order:
@@ -162,6 +173,7 @@ def _with_lost_nodes(
 ) -> tuple[Integers, Floats]:
     """All nodes of an old file: Gmsh forgets those no element uses."""
     start = re.search(rb"\$(?:Nodes|NOD)\s*?\n\s*(\d+)[^\n]*\n", data)
+    assert start, "Gmsh has read this section"
     count = int(start[1])
     if count == len(numbers):
         return numbers, points
@@ -170,9 +182,9 @@ def _with_lost_nodes(
         table = np.frombuffer(data[start.end() : start.end() + count * row.itemsize], dtype=row)
         every, places = table["number"].astype(np.int64), table["point"].astype(float)
     else:
-        end = re.compile(rb"\$End(?:Nodes|NOD)", re.IGNORECASE).search(data, start.end()).start()
-        table = np.fromstring(data[start.end() : end].decode("latin-1"), sep=" ").reshape(-1, 4)
-        every, places = table[:, 0].astype(np.int64), table[:, 1:]
+        lines = data[start.end() : data.find(b"$", start.end())].decode("latin-1")
+        values = np.fromstring(lines, sep=" ").reshape(-1, 4)
+        every, places = values[:, 0].astype(np.int64), values[:, 1:]
     if len(np.unique(every)) < count:
         raise mesh_error(path)("a node number is given twice", cure=CURE)
     return every, places

@@ -1,4 +1,4 @@
-"""Named sets of nodes: chosen by geometry, found by name, and the lines, surfaces and cells they stand for."""
+"""Named sets of nodes: chosen by geometry, found by name; the lines, surfaces and cells they stand for."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import CaseError, did_you_mean
-from .kinds import KINDS, part_kind, part_sizes
-from .mesh import Floats, Group, Integers, Mesh
-from .parts import outer_sides, rows_in, unique_rows
+from ancf_petsc.errors import CaseError, did_you_mean
+from ancf_petsc.mesh.kinds import KINDS, part_kind, part_sizes
+from ancf_petsc.mesh.mesh import Floats, Group, Integers, Mesh
+from ancf_petsc.mesh.parts import outer_sides, rows_in, unique_rows
 
 TOLERANCE = 1e-6
 """Nodes closer to a plane or a box than this times the mesh size are in it."""
@@ -78,7 +78,9 @@ def _choose(
     return group
 
 
-def _on_plane(mesh: Mesh, specification: Specification, key: str, file) -> tuple[Integers, str]:
+def _on_plane(
+    mesh: Mesh, specification: Specification, key: str, file: str | Path | None
+) -> tuple[Integers, str]:
     """Nodes at a height along an axis or a normal, which is made a unit vector."""
     plane, at = specification["plane"], specification["at"]
     normal = np.eye(3)["xyz".index(plane)] if isinstance(plane, str) else np.array(plane, dtype=float)
@@ -93,20 +95,19 @@ def _on_plane(mesh: Mesh, specification: Specification, key: str, file) -> tuple
     return np.flatnonzero(near), sought
 
 
-def _in_box(mesh: Mesh, specification: Specification, key: str, file) -> tuple[Integers, str]:
+def _in_box(
+    mesh: Mesh, specification: Specification, key: str, file: str | Path | None
+) -> tuple[Integers, str]:
     """Nodes in a box given by two opposite corners."""
     low, high = np.sort(np.array(specification["box"], dtype=float), axis=0)
     slack = TOLERANCE * mesh.size
     inside = ((mesh.points >= low - slack) & (mesh.points <= high + slack)).all(axis=1) & mesh.used
-    body = mesh.points[mesh.used]
-    sought = (
-        f"no node between {_place(low)} and {_place(high)}, "
-        f"the mesh lies between {_place(body.min(axis=0))} and {_place(body.max(axis=0))}"
-    )
-    return np.flatnonzero(inside), sought
+    return np.flatnonzero(inside), f"no node between {_place(low)} and {_place(high)}; {_extent(mesh)}"
 
 
-def _nearest(mesh: Mesh, specification: Specification, key: str, file) -> tuple[Integers, str]:
+def _nearest(
+    mesh: Mesh, specification: Specification, key: str, file: str | Path | None
+) -> tuple[Integers, str]:
     """The nodes nearest to a point or to each of several."""
     nodes = np.flatnonzero(mesh.used)
     found = []
@@ -116,11 +117,10 @@ def _nearest(mesh: Mesh, specification: Specification, key: str, file) -> tuple[
         around = mesh.points[mesh.cells[(mesh.cells == node).any(axis=1)].ravel()]
         edge = np.linalg.norm(around - mesh.points[node], axis=1).max()
         if distances.min() > edge:
-            body = mesh.points[nodes]
             raise CaseError(
-                f"no node near {_place(place)}: the nearest, {mesh.node_numbers[node]}, at "
-                f"{_place(mesh.points[node])} is {distances.min():.6g} away, farther than its longest edge "
-                f"{edge:.6g}; the mesh lies between {_place(body.min(axis=0))} and {_place(body.max(axis=0))}",
+                f"no node near {_place(place)}: the nearest, {mesh.node_numbers[node]} at "
+                f"{_place(mesh.points[node])}, is {distances.min():.6g} away, farther than its longest edge "
+                f"{edge:.6g}; {_extent(mesh)}",
                 file=file,
                 key=f"{key}.nearest",
                 cure="give a point on the body",
@@ -129,11 +129,20 @@ def _nearest(mesh: Mesh, specification: Specification, key: str, file) -> tuple[
     return np.unique(np.array(found, dtype=np.int64)), "no point is given"
 
 
-CHOICES: dict[str, Callable[..., tuple[Integers, str]]] = {"plane": _on_plane, "box": _in_box, "nearest": _nearest}
+CHOICES: dict[str, Callable[..., tuple[Integers, str]]] = {
+    "plane": _on_plane,
+    "box": _in_box,
+    "nearest": _nearest,
+}
 
 
 def _place(point: Floats) -> str:
     return "(" + ", ".join(f"{value:.6g}" for value in point) + ")"
+
+
+def _extent(mesh: Mesh) -> str:
+    body = mesh.points[mesh.used]
+    return f"the mesh lies between {_place(body.min(axis=0))} and {_place(body.max(axis=0))}"
 
 
 def _union(mesh: Mesh, name: str, members: Sequence[Group]) -> Group:
@@ -160,7 +169,9 @@ def find_group(mesh: Mesh, name: str, key: str, file: str | Path | None) -> Grou
     """The group of a name; CaseError about `key` where there is none or where it is empty."""
     group = mesh.groups.get(name)
     if group is None:
-        raise CaseError("no such group", file=file, key=key, got=name, cure=did_you_mean(name, list(mesh.groups)))
+        raise CaseError(
+            "no such group", file=file, key=key, got=name, cure=did_you_mean(name, list(mesh.groups))
+        )
     if not len(group.nodes):
         raise CaseError(
             "the group is empty: the mesh file names it and gives it no part of the body",
@@ -188,8 +199,8 @@ def parts_for_load(mesh: Mesh, group: Group) -> tuple[int, Integers]:
     dimension = max(group.parts, default=0)
     if dimension:
         return dimension, group.parts[dimension]
-    sides = _sides_within(mesh, group.nodes) if not group.parts else ()
-    return (_dimension(mesh) - 1, sides) if len(sides) else (0, group.nodes)
+    sides = surface_of(mesh, group)
+    return (0, group.nodes) if sides is None else (_dimension(mesh) - 1, sides)
 
 
 def surface_of(mesh: Mesh, group: Group) -> Integers | None:
@@ -207,7 +218,7 @@ def measure(mesh: Mesh, dimension: int, parts: Integers) -> float:
 
 
 def cells_of(mesh: Mesh, group: Group) -> Integers:
-    """Ascending indices of the cells that are the group's parts, or whose nodes all belong to a set of nodes."""
+    """Ascending indices of the cells that are the group's parts, else of those with all nodes in it."""
     own = group.parts.get(_dimension(mesh))
     if own is None:
         return np.flatnonzero(_belongs(mesh, group.nodes)[mesh.cells].all(axis=1))

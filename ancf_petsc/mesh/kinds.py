@@ -6,10 +6,11 @@ Names and the order of corners and mid-nodes are meshio's, which are VTK's.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from .mesh import Floats, Integers
+from ancf_petsc.mesh.mesh import Floats, Integers
 
 Corners = tuple[tuple[int, ...], ...]
 
@@ -54,25 +55,23 @@ _ACROSS = (1, 0, 3, 2, 5, 4, 7, 6)
 _KUHN_MIRRORED = tuple((_ACROSS[a], _ACROSS[c], _ACROSS[b], _ACROSS[d]) for a, b, c, d in KUHN)
 
 _REGULAR_TRIANGLE = np.array([[1, 0.5], [0, np.sqrt(3) / 2]])
-_REGULAR_TETRAHEDRON = np.array(
-    [[1, 0.5, 0.5], [0, np.sqrt(3) / 2, np.sqrt(3) / 6], [0, 0, np.sqrt(2 / 3)]]
-)
-_TETRA = dict(
-    dimension=3,
-    sides=((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
-    edges=((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)),
-    frames=((0, 1, 2, 3),),
-    simplices=((0, 1, 2, 3),),
-    ideal=_REGULAR_TETRAHEDRON,
-)
-_TRIANGLE = dict(
-    dimension=2,
-    sides=((0, 1), (1, 2), (2, 0)),
-    edges=((0, 1), (1, 2), (2, 0)),
-    frames=((0, 1, 2),),
-    simplices=((0, 1, 2),),
-    ideal=_REGULAR_TRIANGLE,
-)
+_REGULAR_TETRAHEDRON = np.array([[1, 0.5, 0.5], [0, np.sqrt(3) / 2, np.sqrt(3) / 6], [0, 0, np.sqrt(2 / 3)]])
+_TETRA: dict[str, Any] = {
+    "dimension": 3,
+    "sides": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
+    "edges": ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)),
+    "frames": ((0, 1, 2, 3),),
+    "simplices": ((0, 1, 2, 3),),
+    "ideal": _REGULAR_TETRAHEDRON,
+}
+_TRIANGLE: dict[str, Any] = {
+    "dimension": 2,
+    "sides": ((0, 1), (1, 2), (2, 0)),
+    "edges": ((0, 1), (1, 2), (2, 0)),
+    "frames": ((0, 1, 2),),
+    "simplices": ((0, 1, 2),),
+    "ideal": _REGULAR_TRIANGLE,
+}
 
 KINDS = {
     kind.name: kind
@@ -149,19 +148,22 @@ KINDS = {
 
 BY_GMSH = {kind.gmsh: kind for kind in KINDS.values()}
 
-_LINEAR_OF = {
-    (kind.dimension, kind.nodes): kind
-    for kind in map(KINDS.get, ("vertex", "line", "triangle", "quad", "tetra", "hexahedron"))
+_PARTS = {
+    (KINDS[name].dimension, KINDS[name].nodes): KINDS[name]
+    for name in ("vertex", "line", "triangle", "quad", "tetra", "hexahedron")
 }
 
 
 def part_kind(dimension: int, corners: int) -> Kind:
     """The kind of parts of a dimension with so many corners."""
-    return _LINEAR_OF[dimension, corners]
+    return _PARTS[dimension, corners]
 
 
 def determinants(points: Floats, cells: Integers, kind: Kind) -> Floats:
-    """Determinants (e, s) of the frames s of cells (e, k): plane cells are seen from +z, lines give lengths."""
+    """Determinants (e, s) of the frames s of cells (e, k).
+
+    Plane cells are seen from +z; lines give lengths.
+    """
     edges = _frame_edges(points, cells, kind)
     if kind.dimension == 3:
         return np.einsum("esi,esi->es", edges[:, :, 0], np.cross(edges[:, :, 1], edges[:, :, 2]))

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from .kinds import KINDS
-from .mesh import Integers
-from .raw import Block, RawMesh, mesh_error
+from ancf_petsc.mesh.kinds import KINDS
+from ancf_petsc.mesh.mesh import Integers
+from ancf_petsc.mesh.raw import Block, RawMesh, mesh_error
 
 TAGS = ("gmsh:physical", "medit:ref", "nastran:ref", "netgen:index", "su2:tag", "abaqus:material")
 SAME = {"tetra4": "tetra"}
@@ -35,7 +35,7 @@ def read_meshio(path: Path) -> RawMesh:
     first = np.cumsum([1, *map(len, cells)])
     blocks = [
         Block(kind, np.arange(start, start + len(nodes)), nodes.astype(np.int64) + 1)
-        for kind, nodes, start in zip(kinds, cells, first)
+        for kind, nodes, start in zip(kinds, cells, first[:-1], strict=True)
     ]
     listed = [
         Block(block.kind, block.numbers[rows], block.nodes[rows], (name,))
@@ -54,7 +54,11 @@ def _read(path: Path) -> Any:
 
     wrong = mesh_error(path)
     if not set(path.suffixes) & set(meshio.extension_to_filetypes):
-        raise wrong("not a format meshes are read from", got=path.suffix, expected=f"one of {ALL} or what meshio reads")
+        raise wrong(
+            "not a format meshes are read from",
+            got=path.suffix,
+            expected=f"one of {ALL} or what meshio reads",
+        )
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
@@ -66,7 +70,9 @@ def _read(path: Path) -> Any:
     else:
         return mesh
     reason = " ".join(reason.split())
-    raise wrong(f"meshio cannot read it ({reason})", cure="the file may be truncated or damaged: write it again")
+    raise wrong(
+        f"meshio cannot read it ({reason})", cure="the file may be truncated or damaged: write it again"
+    )
 
 
 def _cell_sets(mesh: Any, kinds: list[str]) -> Iterator[tuple[str, int, Integers]]:
@@ -78,7 +84,7 @@ def _cell_sets(mesh: Any, kinds: list[str]) -> Iterator[tuple[str, int, Integers
                 yield name, block, rows[rows < len(mesh.cells[block].data)]
     for key, by_block in mesh.cell_data.items():
         if key == "cell_tags" and hasattr(mesh, "cell_tags"):
-            names = {tag: families for tag, families in mesh.cell_tags.items()}
+            names = dict(mesh.cell_tags)
         elif key in TAGS:
             names = None
         else:
@@ -119,7 +125,7 @@ def _tag_names(mesh: Any, dimension: int, tag: int) -> list[str]:
 
 
 def _set_names(key: str, data: list[np.ndarray]) -> dict[int, list[str]]:
-    """Tag -> name where `key` is the names of sets joined by "-" and the data count them from 0, -1 for none."""
+    """Tag -> name where `key` is the names of sets joined by "-" and the data number them, -1 for none."""
     names = key.split("-")
     tags = np.unique(np.concatenate([np.ravel(part) for part in data]))
     counted = tags.dtype.kind in "iu" and len(tags) and tags.min() >= -1 and tags.max() == len(names) - 1

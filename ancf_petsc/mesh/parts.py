@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kinds import KINDS
-from .mesh import Integers
+from ancf_petsc.mesh.kinds import KINDS
+from ancf_petsc.mesh.mesh import Integers
 
 _WORD = 2**63
 
@@ -33,7 +33,7 @@ def unique_rows(rows: Integers, bound: int) -> Integers:
 
 
 def rows_in(rows: Integers, others: Integers, bound: int) -> np.ndarray:
-    """For each of rows (m, k) its index in `others` (n, k), whose rows are unique; -1 where it is not there."""
+    """For each of rows (m, k) its index in the unique rows `others` (n, k), -1 where it is not there."""
     keys = row_keys(np.vstack([others, rows]), bound)
     known, sought = keys[: len(others)], keys[len(others) :]
     if not len(others):

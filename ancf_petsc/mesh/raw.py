@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from ..errors import MeshError
-from .mesh import Floats, Integers
+from ancf_petsc.errors import MeshError
+from ancf_petsc.mesh.mesh import Floats, Integers
 
 
 @dataclass(frozen=True)

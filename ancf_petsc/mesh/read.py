@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from .assemble import assemble
-from .gmsh_file import read_gmsh
-from .mesh import Mesh
-from .meshio_file import read_meshio
-from .raw import mesh_error
+from ancf_petsc.mesh.assemble import assemble
+from ancf_petsc.mesh.gmsh_file import read_gmsh
+from ancf_petsc.mesh.mesh import Mesh
+from ancf_petsc.mesh.meshio_file import read_meshio
+from ancf_petsc.mesh.raw import mesh_error
 
 
 def read_mesh(

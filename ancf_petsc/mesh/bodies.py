@@ -1,0 +1,174 @@
+"""The bodies the project makes meshes of, in metres.
+
+The geometry of `pvc_block` is assumed: the drawing in the paper is lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ancf_petsc.errors import CaseError
+from ancf_petsc.mesh.mesh import Floats
+
+Plane = tuple[str, float]
+Faces = dict[str, tuple[Plane, ...]]
+Edges = dict[str, tuple[tuple[Plane, Plane], ...]]
+
+
+@dataclass(frozen=True)
+class Body:
+    """One of the project's bodies.
+
+    faces: group name -> planes its faces lie on, as (axis, coordinate).
+    edges: group name -> lines it is made of, each as two planes.
+    build: adds the solid to Gmsh's OpenCASCADE model.
+    grid: structured points (nz + 1, ny + 1, nx + 1, 3) from divisions (nx, ny, nz).
+    size, divisions: what is made where nothing is asked for; size is the length of edges.
+    """
+
+    about: str
+    build: Callable[[Any], None]
+    grid: Callable[[Sequence[int]], Floats]
+    faces: Faces
+    edges: Edges
+    size: float
+    divisions: tuple[int, int, int]
+
+
+def _add_box(gmsh: Any, low: Sequence[float], high: Sequence[float]) -> None:
+    gmsh.model.occ.addBox(*low, *np.subtract(high, low))
+
+
+def _box_grid(divisions: Sequence[int], low: Sequence[float], high: Sequence[float]) -> Floats:
+    axes = [np.linspace(low[i], high[i], divisions[i] + 1) for i in range(3)]
+    z, y, x = np.meshgrid(*axes[::-1], indexing="ij")
+    return np.stack([x, y, z], axis=-1)
+
+
+def box(
+    about: str,
+    low: Sequence[float],
+    high: Sequence[float],
+    *,
+    faces: Faces,
+    edges: Edges | None = None,
+    size: float,
+    divisions: tuple[int, int, int],
+) -> Body:
+    """A box from its lowest to its highest corner."""
+    build, grid = partial(_add_box, low=low, high=high), partial(_box_grid, low=low, high=high)
+    return Body(about, build, grid, faces, edges or {}, size, divisions)
+
+
+INNER, OUTER, HEIGHT = 0.025, 0.095, 0.1
+GROOVE_DEPTH, GROOVE_MOUTH = 0.025, 0.02
+LOWER, UPPER = (HEIGHT - GROOVE_MOUTH) / 2, (HEIGHT + GROOVE_MOUTH) / 2
+
+
+def _add_pvc_block(gmsh: Any) -> None:
+    """The section in the plane y = 0, turned by a right angle about z."""
+    section = [(INNER, 0.0), (OUTER, 0.0), (OUTER, LOWER), (OUTER - GROOVE_DEPTH, HEIGHT / 2)]
+    section += [(OUTER, UPPER), (OUTER, HEIGHT), (INNER, HEIGHT)]
+    occ = gmsh.model.occ
+    points = [occ.addPoint(x, 0, z) for x, z in section]
+    lines = [occ.addLine(one, other) for one, other in zip(points, [*points[1:], points[0]], strict=True)]
+    face = occ.addPlaneSurface([occ.addCurveLoop(lines)])
+    occ.revolve([(2, face)], 0, 0, 0, 0, 0, 1, np.pi / 2)
+
+
+def _pvc_grid(divisions: Sequence[int]) -> Floats:
+    """Divisions across the wall, around the quarter, over the height; the groove's corners are nodes."""
+    across, around, over = divisions
+    if over < 4 or over % 2:
+        raise CaseError("divisions over the height", got=over, expected="an even number, at least 4")
+    flank = max(1, round(over * GROOVE_MOUTH / HEIGHT / 2))
+    lower = np.linspace(0, LOWER, over // 2 - flank + 1)
+    half = np.concatenate([lower, np.linspace(LOWER, HEIGHT / 2, flank + 1)[1:]])
+    z = np.concatenate([half, HEIGHT - half[-2::-1]])
+    depth = GROOVE_DEPTH * np.clip(1 - np.abs(z - HEIGHT / 2) / (GROOVE_MOUTH / 2), 0, None)
+    radius = INNER + (OUTER - depth - INNER)[:, None, None] * np.linspace(0, 1, across + 1)
+    angle = np.linspace(0, np.pi / 2, around + 1)[:, None]
+    cosine = np.where(angle == angle[-1], 0, np.cos(angle))
+    x, y, z = np.broadcast_arrays(radius * cosine, radius * np.sin(angle), z[:, None, None])
+    return np.stack([x, y, z], axis=-1)
+
+
+def _perimeter(z: float, x: Sequence[float], y: Sequence[float]) -> tuple[tuple[Plane, Plane], ...]:
+    return tuple((("z", z), ("x", end)) for end in x) + tuple((("z", z), ("y", end)) for end in y)
+
+
+QUARTER: Faces = {
+    "bottom": (("z", 0.0),),
+    "top": (("z", 0.1),),
+    "symmetry_x": (("x", 0.0),),
+    "symmetry_y": (("y", 0.0),),
+}
+
+BODIES = {
+    "pvc_block": Body(
+        "quarter of a grooved ring 190 x 100 mm, bore 50, groove 25 deep and 20 wide (assumed geometry)",
+        _add_pvc_block,
+        _pvc_grid,
+        QUARTER,
+        {},
+        0.01,
+        (4, 8, 10),
+    ),
+    "cube": box(
+        "quarter block 50 x 50 x 100 mm",
+        (0, 0, 0),
+        (0.05, 0.05, 0.1),
+        faces=QUARTER,
+        size=0.005,
+        divisions=(5, 5, 10),
+    ),
+    "bar": box(
+        "bar 0.1 x 0.1 x 0.5 m hanging along z",
+        (0, 0, -0.5),
+        (0.1, 0.1, 0),
+        faces={"top": (("z", 0.0),), "bottom": (("z", -0.5),)},
+        edges={"bottom_edges": _perimeter(-0.5, (0, 0.1), (0, 0.1))},
+        size=0.05,
+        divisions=(2, 2, 10),
+    ),
+    "pendulum": box(
+        "pendulum 0.5 x 0.1 x 0.1 m along x, hinged at an upper edge",
+        (0, 0, 0),
+        (0.5, 0.1, 0.1),
+        faces={"tip": (("x", 0.5),)},
+        edges={"hinge": ((("x", 0.0), ("z", 0.1)),)},
+        size=0.18,
+        divisions=(4, 2, 2),
+    ),
+    "pendulum_vertical": box(
+        "the pendulum upright along z, hinged at a lower edge",
+        (0, 0, 0),
+        (0.1, 0.1, 0.5),
+        faces={"tip": (("z", 0.5),)},
+        edges={"hinge": ((("x", 0.0), ("z", 0.0)),)},
+        size=0.18,
+        divisions=(2, 2, 4),
+    ),
+    "ellipsograph": box(
+        "beam 1 x 0.01 x 0.02 m along x of the ellipsograph",
+        (0, 0, 0),
+        (1, 0.01, 0.02),
+        faces={"left": (("x", 0.0),), "right": (("x", 1.0),), "side_y0": (("y", 0.0),)},
+        edges={"left_edge": ((("x", 0.0), ("z", 0.0)),), "right_edge": ((("x", 1.0), ("z", 0.0)),)},
+        size=0.095,
+        divisions=(13, 1, 1),
+    ),
+    "cantilever": box(
+        "beam 1 x 0.1 x 0.1 m along x",
+        (0, 0, 0),
+        (1, 0.1, 0.1),
+        faces={"clamp": (("x", 0.0),), "end": (("x", 1.0),)},
+        size=0.05,
+        divisions=(20, 2, 2),
+    ),
+}
