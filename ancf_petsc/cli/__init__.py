@@ -148,7 +148,9 @@ class _Version(argparse.Action):
             number = version("ancf_petsc")
         except PackageNotFoundError:
             number = "(not installed)"
-        parser.exit(0, f"ancf_petsc {number}\n")
+        if rank() == 0:
+            print(f"ancf_petsc {number}")
+        parser.exit()
 
 
 def _unknown_verb(word: str) -> CaseError:
