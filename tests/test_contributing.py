@@ -1,0 +1,66 @@
+"""The walks of CONTRIBUTING.md: what a newcomer would add is added as it stands there, and computes."""
+
+import sys
+from types import ModuleType
+
+import numba
+import numpy as np
+import pytest
+
+from ancf_petsc import cli
+from ancf_petsc.element.element import Element
+from ancf_petsc.element.shape import complete_polynomials
+from ancf_petsc.material import models
+
+
+def code_of(project, heading):
+    """The Python block under a heading of CONTRIBUTING.md."""
+    text = (project / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    section = text.split(f"## {heading}\n")[1].split("\n## ")[0]
+    return section.split("```python\n")[1].split("```")[0]
+
+
+def test_an_element_is_a_row(project):
+    """The new row reproduces what it claims on its reference cell, and its mass is the cell's."""
+    element = eval(code_of(project, "Add an element"), {"Element": Element})
+    tables = element.tables("mass")
+    for exponents in complete_polynomials(3, element.complete):
+        nodal = np.prod(element.node_coordinates**exponents, axis=1)
+        wanted = np.prod(tables.points**exponents, axis=1)
+        # Rounding of 20 terms of size 1.
+        np.testing.assert_allclose(tables.values @ nodal, wanted, rtol=0, atol=1e-14)
+    mass = np.einsum("q,qa,qb->ab", tables.weights, tables.values, tables.values)
+    assert mass.sum() == pytest.approx(float(element.cell.volume), rel=1e-14)
+    assert np.linalg.matrix_rank(mass) == element.functions
+
+
+def test_a_material_is_a_block(project):
+    """As machine code: P is the derivative of the energy and A that of P; no stress at F = I."""
+    namespace = {**vars(models), "LAWS": {}}
+    exec(code_of(project, "Add a material"), namespace)
+    law = namespace["LAWS"]["ciarlet"]
+    energy, stress, tangent = (numba.njit(f) for f in (law.energy, law.stress, law.tangent))
+    p = law.parameters(1.0, 0.3)
+    F = np.eye(3) + 0.2 * np.random.default_rng(7).normal(size=(3, 3))
+    P = np.reshape(stress(tuple(F.ravel()), p), (3, 3))
+    unit, h = np.eye(3), 1e-6
+    for k, L in np.ndindex(3, 3):
+        step = h * np.outer(unit[k], unit[L])
+        ahead, behind = tuple((F + step).ravel()), tuple((F - step).ravel())
+        # Central differences: h² of truncation and 1e-16 / h of rounding, with factors of the law below 100.
+        assert P[k, L] == pytest.approx((energy(ahead, p) - energy(behind, p)) / (2 * h), abs=1e-8)
+        slope = (np.array(stress(ahead, p)) - np.array(stress(behind, p))).reshape(3, 3) / (2 * h)
+        for J in range(3):
+            block = np.reshape(tangent(tuple(F.ravel()), tuple(unit[J]), tuple(unit[L]), p), (3, 3))
+            np.testing.assert_allclose(block[:, k], slope[:, J], rtol=0, atol=1e-8)
+    assert np.abs(stress(tuple(np.eye(3).ravel()), p)).max() == 0.0
+
+
+def test_a_verb_is_a_file_and_a_line(project, monkeypatch, capsys):
+    module = ModuleType("ancf_petsc.cli.volume")
+    exec(code_of(project, "Add a verb"), vars(module))
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setitem(cli.VERBS, "volume", (module.__name__, module.HELP))
+    assert cli.main(["volume", str(project / "meshes" / "bar_2x2x10.msh")]) == 0
+    # The bar of 0.5 x 0.1 x 0.1 m; rounding of 240 volumes.
+    assert float(capsys.readouterr().out) == pytest.approx(0.005, rel=1e-13)
