@@ -58,7 +58,7 @@ class GroupSpec(Table):
     at: float | Literal["min", "max"] | None = key(
         'a number, "min" or "max"; where the plane cuts its normal', None
     )
-    box: tuple[Vector, Vector] | None = key("two corners [[x, y, z], [x, y, z]]; lowest first", None)
+    box: tuple[Vector, Vector] | None = key("two corners [[x, y, z], [x, y, z]]; opposite ones", None)
     nearest: Points | None = key("a point [x, y, z] or a list of points; such as [0.5, 0.0, 0.1]", None)
     union: tuple[Name, ...] | None = key('a list of group names; such as ["end", "slab"]', None, min_length=1)
 
@@ -80,10 +80,6 @@ class GroupSpec(Table):
         if self.plane == (0.0, 0.0, 0.0):
             raise problem(
                 at=["plane"], got=self.plane, expected="a normal with a length", cure='or an axis such as "x"'
-            )
-        if self.box and any(low > high for low, high in zip(*self.box, strict=True)):
-            raise problem(
-                at=["box"], got=self.box, expected="[lowest corner, highest corner]", cure="swap the bounds"
             )
         return self
 

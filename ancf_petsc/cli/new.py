@@ -28,7 +28,7 @@ element = "3413"              # linear tetrahedra
 # Groups of nodes come by name from the mesh file. More can be chosen by geometry:
 # [groups]
 # end  = {{ plane = "x", at = "max" }}                  # an axis or a normal; a number, "min" or "max"
-# slab = {{ box = [[0, 0, 0], [1, 1, 0.1]] }}           # lowest and highest corner
+# slab = {{ box = [[0, 0, 0], [1, 1, 0.1]] }}           # two opposite corners
 # tips = {{ nearest = [0.5, 0.0, 0.1] }}                # the node nearest to a point, or to each of several
 # both = {{ union = ["end", "slab"] }}
 """
