@@ -62,7 +62,7 @@ class ResultStore:
     def __init__(
         self,
         folder: Path,
-        comm: MPI.Comm,
+        comm: MPI.Intracomm,
         title: str,
         units: str,
         *,
