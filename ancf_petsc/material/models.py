@@ -8,7 +8,13 @@ F, P and K are tuples of nine numbers, row by row; u and v are material vectors 
 parameters. The tangent is given as the block it makes between two shape functions with gradients u and v: unit vectors for u
 and v give all of A. `parameters` makes p of Young's modulus and Poisson's ratio.
 
-Source: Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed. (2008), sections 6.4 and 6.5;
+For steps that keep energy a law may have a discrete gradient between two states, with F = (F0 + F1) / 2:
+
+    P = mean_stress(F0, F1, p)         P = F S, S symmetric, S : (E1 - E0) = psi(F1) - psi(F0)
+    K = mean_tangent(F0, F1, u, v, p)  as `tangent`, with A = dP/dF1
+
+Sources: Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed. (2008), sections 6.4 and 6.5;
+Gonzalez, Exact energy and momentum conserving algorithms for general models in nonlinear elasticity, CMAME 190 (2000) 1763;
 the first law is the one of Olshevskiy et al. (2017), Eqs. (7)-(9), with the misprint of (9) mended (docs/theory.md).
 """
 
@@ -40,6 +46,9 @@ from ancf_petsc.material.tensor import (
 )
 
 
+SAME_STRAIN = 1e-8  # below it the difference of two strains is rounding, and so is what it would correct
+
+
 class Law(NamedTuple):
     """A hyperelastic law: see the head of this module."""
 
@@ -49,6 +58,8 @@ class Law(NamedTuple):
     stress: Callable
     tangent: Callable
     parameters: Callable[[float, float], NDArray[np.float64]]
+    mean_stress: Callable | None = None
+    mean_tangent: Callable | None = None
 
 
 def lame_parameters(young: float, poisson: float) -> NDArray[np.float64]:
@@ -102,6 +113,28 @@ def svk_tangent(F, u, v, p):
     return add(material, along)
 
 
+@register_jitable
+def middle(A, B):
+    """(A + B) / 2."""
+    return scale(0.5, add(A, B))
+
+
+@register_jitable
+def svk_mean_stress(F0, F1, p):
+    S = svk_second_stress(middle(green_lagrange(F0), green_lagrange(F1)), p)
+    return dot(middle(F0, F1), S)
+
+
+@register_jitable
+def svk_mean_tangent(F0, F1, u, v, p):
+    F = middle(F0, F1)
+    S = svk_second_stress(middle(green_lagrange(F0), green_lagrange(F1)), p)
+    volumetric = scale(p[0], outer(apply(F, u), apply(F1, v)))
+    shear = add(outer(apply(F, v), apply(F1, u)), scale(inner(u, v), dot(F, transpose(F1))))
+    material = add(volumetric, scale(p[1], shear))
+    return scale(0.5, add(material, scale(inner(u, apply(S, v)), IDENTITY)))
+
+
 # --- compressible neo-Hooke: psi = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2
 
 
@@ -131,10 +164,74 @@ def neo_hooke_tangent(F, u, v, p):
     return add(volumetric, scale(p[1] * inner(u, v), IDENTITY))
 
 
+@register_jitable
+def neo_hooke_second_stress(C, p):
+    """S and C^-1 from C = FᵀF."""
+    inverse = inverse_transpose(C, determinant(C))
+    log_J = 0.5 * log(determinant(C)) if determinant(C) > 0.0 else np.nan
+    return add(scale(p[1], IDENTITY), scale(p[0] * log_J - p[1], inverse)), inverse, log_J
+
+
+@register_jitable
+def neo_hooke_correction(F0, F1, S, p):
+    """N = E1 - E0, N : N and the factor of N that makes S a discrete gradient; 0 where the states are the same."""
+    N = scale(0.5, add(gram(F1), scale(-1.0, gram(F0))))
+    length = contract(N, N)
+    if length < SAME_STRAIN**2:
+        return N, length, 0.0
+    rise = neo_hooke_energy(F1, p) - neo_hooke_energy(F0, p)
+    return N, length, (rise - contract(S, N)) / length
+
+
+@register_jitable
+def neo_hooke_mean_stress(F0, F1, p):
+    S, _, _ = neo_hooke_second_stress(middle(gram(F0), gram(F1)), p)
+    N, _, factor = neo_hooke_correction(F0, F1, S, p)
+    return dot(middle(F0, F1), add(S, scale(factor, N)))
+
+
+@register_jitable
+def neo_hooke_mean_tangent(F0, F1, u, v, p):
+    F = middle(F0, F1)
+    S, inverse, log_J = neo_hooke_second_stress(middle(gram(F0), gram(F1)), p)
+    N, length, factor = neo_hooke_correction(F0, F1, S, p)
+    S1, _, _ = neo_hooke_second_stress(gram(F1), p)
+    pull = add(S1, scale(-1.0, S))
+    parts = (inverse, log_J, pull, N, length, factor)
+    a = apply(F, apply(neo_hooke_mean_growth((F1[0], F1[1], F1[2]), v, parts, p), u))
+    b = apply(F, apply(neo_hooke_mean_growth((F1[3], F1[4], F1[5]), v, parts, p), u))
+    c = apply(F, apply(neo_hooke_mean_growth((F1[6], F1[7], F1[8]), v, parts, p), u))
+    material = (a[0], b[0], c[0], a[1], b[1], c[1], a[2], b[2], c[2])
+    geometric = 0.5 * inner(u, apply(add(S, scale(factor, N)), v))
+    return add(material, scale(geometric, IDENTITY))
+
+
+@register_jitable
+def neo_hooke_mean_growth(w, v, parts, p):
+    """Change of the mean S when row w of F1 grows along v."""
+    inverse, log_J, pull, N, length, factor = parts
+    dE = middle(outer(w, v), outer(v, w))
+    turned = dot(inverse, dot(dE, inverse))
+    dS = add(scale(p[1] - p[0] * log_J, turned), scale(0.5 * p[0] * contract(inverse, dE), inverse))
+    if length < SAME_STRAIN**2:
+        return dS
+    slope = (contract(pull, dE) - contract(dS, N) - 2.0 * factor * contract(N, dE)) / length
+    return add(dS, add(scale(factor, dE), scale(slope, N)))
+
+
 LAWS = {
     law.name: law
     for law in (
-        Law("svk", "St Venant-Kirchhoff", svk_energy, svk_stress, svk_tangent, lame_parameters),
+        Law(
+            "svk",
+            "St Venant-Kirchhoff",
+            svk_energy,
+            svk_stress,
+            svk_tangent,
+            lame_parameters,
+            svk_mean_stress,
+            svk_mean_tangent,
+        ),
         Law(
             "neo_hooke",
             "compressible neo-Hooke",
@@ -142,6 +239,8 @@ LAWS = {
             neo_hooke_stress,
             neo_hooke_tangent,
             lame_parameters,
+            neo_hooke_mean_stress,
+            neo_hooke_mean_tangent,
         ),
     )
 }
