@@ -28,7 +28,7 @@ def block(mesh: str, stroke: float, **statics: Any) -> dict[str, Any]:
     }
 
 
-def bar(mesh: str, gravity: bool) -> dict[str, Any]:  # noqa: FBT001
+def bar(mesh: str, *, gravity: bool) -> dict[str, Any]:
     """The bar of section 5.1: 120 N along the edges of its lower face, with or without its own weight."""
     force = {"type": "force", "group": "bottom_edges", "total": [0.0, 0.0, -120.0]}
     weight = {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}

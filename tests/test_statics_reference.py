@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ancf_petsc import case_from_dict, open_results, run
 from statics_cases import bar, block
+
+from ancf_petsc import case_from_dict, open_results, run
 
 REFERENCE = Path(__file__).parent / "reference"
 STROKES = "[0.005,0.010,0.015,0.020,0.025]"
@@ -59,7 +60,7 @@ def test_bar_stretches_as_the_reference(mesh, gravity, tmp_path):
     rows = np.genfromtxt(REFERENCE / "bar_tension.csv", delimiter=",", names=True)
     elements = 6 * int(np.prod([int(n) for n in mesh[4:].split("x")]))
     row = rows[(rows["elements"] == elements) & (rows["gravity"] == gravity)][0]
-    case = case_from_dict(bar(f"{mesh}.msh", bool(gravity)), tmp_path)
+    case = case_from_dict(bar(f"{mesh}.msh", gravity=bool(gravity)), tmp_path)
     result = run(case, tmp_path / "run")
     # The reference lists 10 digits after the point.
     assert result.probes["middle.uz"][-1] == pytest.approx(row["mid_m"], rel=1e-6, abs=1e-10)
@@ -68,7 +69,7 @@ def test_bar_stretches_as_the_reference(mesh, gravity, tmp_path):
 
 def test_reactions_balance_weight_and_load(tmp_path):
     """rho g V = 382.59 N and the 120 N of the load hang on the top."""
-    result = run(case_from_dict(bar("bar_2x2x10.msh", True), tmp_path), tmp_path / "run")
+    result = run(case_from_dict(bar("bar_2x2x10.msh", gravity=True), tmp_path), tmp_path / "run")
     assert result.curve["top.rz"][-1] == pytest.approx(7800 * 9.81 * 0.005 + 120, rel=1e-9)
     assert result.curve["top.rz"][-1] == pytest.approx(502.59, abs=1e-6)
     assert abs(result.curve["top.rx"][-1]) < 1e-6 * 502.59

@@ -41,9 +41,9 @@ def run_case(
 ) -> Path:
     """Solve a case and leave its results in a folder, which is returned. Collective.
 
-    folder: default results/NAME. force: overwrite a folder that holds something else. imports: seconds spent
-    before. watch: told the part of the path done, 0 to 1. Raises CaseError, NoEquilibrium, Interrupted; what was
-    computed before is saved.
+    folder: default results/NAME. force: overwrite a folder that holds something else. imports: seconds
+    spent before. watch: told the part of the path done, 0 to 1. Raises CaseError, NoEquilibrium, Interrupted;
+    what was computed before is saved.
     """
     folder = Path(folder) if folder else Path("results") / case.name
     clock = Clock(imports)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -125,15 +126,17 @@ class Results:
         """The step nearest to a time."""
         return int(np.argmin(np.abs(self.times - time)))
 
-    def mesh(self, step: int = -1, *, scale: float = 1.0) -> pyvista.UnstructuredGrid:
-        """The body at a step for pyvista, with all fields; displacements times `scale` (0: undeformed)."""
+    def mesh(
+        self, step: int = -1, *, scale: float = 1.0, fields: Iterable[str] | None = None
+    ) -> pyvista.UnstructuredGrid:
+        """The body at a step for pyvista, with all fields or some; displacements times `scale`."""
         import pyvista
 
         count, nodes = self.cells.shape
         connectivity = np.hstack([np.full((count, 1), nodes), self.cells])
         points = self.points + scale * self.field("displacement", step)
         grid = pyvista.UnstructuredGrid(connectivity, np.full(count, CELL_KINDS[self.kind].vtk), points)
-        for name in self.fields:
+        for name in self.fields if fields is None else fields:
             data = grid.point_data if name in self.node_fields else grid.cell_data
             data[name] = self.field(name, step)
         return grid

@@ -6,12 +6,17 @@ the matrix, with rows and columns of driven degrees of freedom left out and one 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
+
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ancf_petsc.kernel.constant import add_mass_blocks
 from ancf_petsc.kernel.graph import block_starts, neighbours
+from ancf_petsc.kernel.mean import make_mean_kernels
 from ancf_petsc.system.model import Model
 
 
@@ -25,6 +30,7 @@ class Assembly:
         self.largest_diagonal = 0.0
         n = model.owned
         self._positions = model.reference.copy()
+        self._second = model.reference.copy()
         self._force = np.zeros_like(model.reference)
         self._driven_bits = model.driven_bits()
         self.driven = np.flatnonzero(model.motion[:n] >= 0)
@@ -48,10 +54,17 @@ class Assembly:
         values = self._positions if into is None else into
         values[: self.model.owned] = x.array_r.reshape(-1, 3)
         if self._ghosts is not None:
-            scatter, ghosts = self._ghosts
+            scatter, ghosts, _ = self._ghosts
             scatter.scatter(x, ghosts, addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
             values[self.model.owned :] = ghosts.array_r.reshape(-1, 3)
         return values
+
+    def with_ghosts(self, field: NDArray, into: NDArray) -> NDArray:
+        """A field (n, 3) on owned nodal vectors with its values at ghosts, in `into` (v, 3). Collective."""
+        if self._ghosts is None:
+            return field
+        self._ghosts[2].array[:] = field.ravel()
+        return self.local(self._ghosts[2], into)
 
     def set_driven(self, x: PETSc.Vec, s: float) -> None:
         """Put the driven degrees of freedom of x where they belong at pseudo-time s."""
@@ -66,6 +79,11 @@ class Assembly:
             total += load.ramp.value(s) * load.pattern
         return total
 
+    @cached_property
+    def graph(self) -> tuple[NDArray, NDArray]:
+        """Pointers (n + 1,) and columns of the owned nodal vectors that share a cell with each: owned ones, then ghosts."""
+        return neighbours(self.model.cells, len(self.model.reference), self.model.owned)
+
     # --- forces and energies
 
     def internal_force(self, x: PETSc.Vec) -> tuple[NDArray, float]:
@@ -79,6 +97,23 @@ class Assembly:
             )
             smallest = min(smallest, found)
         return force[: self.model.owned], smallest
+
+    def mean_force(self, x0: PETSc.Vec, x1: PETSc.Vec) -> tuple[NDArray, float]:
+        """Forces (n, 3) between two states whose work is exactly the growth of the energy, and the smallest det F1."""
+        before, after = self._two_states(x0, x1)
+        force = self._force
+        force[:] = 0.0
+        smallest = np.inf
+        for region in self.model.regions:
+            kernels = make_mean_kernels(region.law)
+            found = kernels.force(
+                before, after, *self.model.tables, region.parameters, region.first, region.last, force
+            )
+            smallest = min(smallest, found)
+        return force[: self.model.owned], smallest
+
+    def _two_states(self, x0: PETSc.Vec, x1: PETSc.Vec) -> tuple[NDArray, NDArray]:
+        return self.local(x0, into=self._second), self.local(x1)
 
     def smallest_det(self, x: PETSc.Vec) -> float:
         """Smallest det F over all cells."""
@@ -125,10 +160,10 @@ class Assembly:
 
     # --- the matrix
 
-    def create_matrix(self) -> PETSc.Mat:
+    def create_matrix(self, *, symmetric: bool = True) -> PETSc.Mat:
         """A matrix that shares its arrays with `tangent`; zero, all blocks of cells present."""
         n = self.model.owned
-        pointers, columns = neighbours(self.model.cells, len(self.model.reference), n)
+        pointers, columns = self.graph
         rows = np.repeat(np.arange(n), np.diff(pointers))
         own = columns < n
         parts = []
@@ -141,16 +176,18 @@ class Assembly:
         )
         self._strides = np.zeros((len(self.model.reference), 2), np.int32)
         self._strides[:n, 0], self._strides[:n, 1] = 3 * np.diff(own_pointers), 3 * np.diff(other_pointers)
+        self._pointers = (own_pointers, other_pointers)
         self._split = 9 * len(own_columns)
         self._values = np.zeros(9 * len(columns))
         self._diagonal = self._diagonal_places(own_pointers, own_columns)
         matrix = self._share(own_pointers, own_columns, other_pointers, other_columns)
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        matrix.setOption(PETSc.Mat.Option.SYMMETRY_ETERNAL, True)
+        if symmetric:
+            matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+            matrix.setOption(PETSc.Mat.Option.SYMMETRY_ETERNAL, True)
         return matrix
 
-    def tangent(self, x: PETSc.Vec, matrix: PETSc.Mat) -> None:
-        """Fill the matrix with the tangent at x."""
+    def tangent(self, x: PETSc.Vec, matrix: PETSc.Mat, add: Callable[[], None] | None = None) -> None:
+        """Fill the matrix with the tangent at x, and what `add` adds to it (`add_mass`)."""
         self.tangent_evaluations += 1
         positions, values = self.local(x), self._values
         values[:] = 0.0
@@ -167,6 +204,44 @@ class Assembly:
                 self._driven_bits,
                 values,
             )
+        if add is not None:
+            add()
+        self._finish(matrix)
+
+    def mean_tangent(
+        self, x0: PETSc.Vec, x1: PETSc.Vec, matrix: PETSc.Mat, add: Callable[[], None] | None = None
+    ) -> None:
+        """Fill the matrix with the derivative of `mean_force` with respect to x1, and what `add` adds to it."""
+        self.tangent_evaluations += 1
+        before, after = self._two_states(x0, x1)
+        self._values[:] = 0.0
+        for region in self.model.regions:
+            make_mean_kernels(region.law).tangent(
+                before,
+                after,
+                *self.model.tables,
+                region.parameters,
+                region.first,
+                region.last,
+                self._starts,
+                self._strides,
+                self._split,
+                self._driven_bits,
+                self._values,
+            )
+        if add is not None:
+            add()
+        self._finish(matrix)
+
+    def add_mass(self, mass: NDArray, factor: float) -> None:
+        """Add factor times a mass, one number per entry of the graph, to the matrix that is being filled."""
+        add_mass_blocks(
+            *self.graph, mass, factor, *self._pointers, self._split, self._driven_bits, self._values
+        )
+
+    def _finish(self, matrix: PETSc.Mat) -> None:
+        """One number on the diagonal of all driven degrees of freedom: the mean of the others."""
+        values = self._values
         diagonal = values[self._diagonal]
         free = np.ones(len(diagonal), bool)
         free[self.driven] = False
@@ -201,7 +276,7 @@ class Assembly:
         return (start[:, None] + component * (3 * counts[:, None] + 1)).ravel()
 
     def _ghost_scatter(self):
-        """PETSc's scatter to the ghosts and the vector it fills; None on one rank."""
+        """PETSc's scatter to the ghosts, the vector it fills and one to fill it from; None on one rank."""
         if self.comm.size == 1:
             return None
         numbers = self.model.ghost_numbers.astype(PETSc.IntType)
@@ -209,8 +284,7 @@ class Assembly:
         source = PETSc.IS().createBlock(3, numbers, comm=PETSc.COMM_SELF)
         x = self.vector()
         scatter = PETSc.Scatter().create(x, source, ghosts, None)
-        x.destroy()
-        return scatter, ghosts
+        return scatter, ghosts, x
 
 
 def _scalar_rows(pointers: NDArray, columns: NDArray) -> tuple[NDArray, NDArray]:

@@ -39,6 +39,10 @@ class Ramp:
                 return (f1 - f0) / (s1 - s0)
         return 0.0
 
+    def curvature(self, s: float) -> float:
+        """Second derivative of the factor with respect to s, corners left out."""
+        return 0.5 * pi * pi * cos(pi * s) if self.kind == "cosine" else 0.0
+
     def corners(self) -> tuple[float, ...]:
         """Pseudo-times in (0, 1) where the rate jumps: the load path is not smooth across them."""
         return tuple(s for s, _ in self.table if 0.0 < s < 1.0)
