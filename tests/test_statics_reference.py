@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from statics_cases import bar, block
 
 from ancf_petsc import case_from_dict, open_results, run
