@@ -130,9 +130,9 @@ def cell_geometry(
         columns = np.einsum("eci,ck->eik", points - origin[:, None], slopes)
         _check_parallelepiped(report, points, origin, columns, reference)
     jacobian = np.linalg.norm(columns, axis=1)[..., None] if d == 1 else columns
-    determinant = np.linalg.det(jacobian)
+    cofactors, determinant = _cofactors(jacobian)
     report.any(determinant <= 0, "is inside out or flat", "a positive volume", "turn or remove it")
-    inverse = np.linalg.inv(jacobian)
+    inverse = cofactors / determinant[:, None, None]
     condition = np.linalg.norm(jacobian, axis=(1, 2)) * np.linalg.norm(inverse, axis=(1, 2))
     report.any(
         ~(condition < WORST_CONDITION * d),
@@ -141,6 +141,19 @@ def cell_geometry(
         "mesh this place again",
     )
     return Geometry(origin, jacobian, inverse, determinant)
+
+
+def _cofactors(J: Floats) -> tuple[Floats, Floats]:
+    """Inverse times determinant (e, d, d) and determinant (e) of matrices of one, two or three columns."""
+    d = J.shape[1]
+    if d == 1:
+        return np.ones_like(J), J[:, 0, 0]
+    if d == 2:
+        rows = np.stack((J[:, 1, 1], -J[:, 0, 1], -J[:, 1, 0], J[:, 0, 0]), axis=1).reshape(-1, 2, 2)
+    else:
+        x, y, z = np.moveaxis(J, 2, 0)
+        rows = np.stack((np.cross(y, z), np.cross(z, x), np.cross(x, y)), axis=1)
+    return rows, np.einsum("ei,ei->e", rows[:, 0], J[:, :, 0])
 
 
 def _check_parallelepiped(report, points: Floats, origin: Floats, columns: Floats, reference: Floats) -> None:
