@@ -1,0 +1,93 @@
+"""What all pictures of a body share: window, camera, text. Works without a display, off screen."""
+
+from __future__ import annotations
+
+import os
+import platform
+from typing import Any
+
+import numpy as np
+import pyvista
+from numpy.typing import NDArray
+from vtkmodules.vtkCommonCore import vtkLogger
+
+from ancf_petsc.errors import EnvironmentProblem
+from ancf_petsc.post.panels import GREY
+
+SIZE = (1500, 1100)
+VIEW = np.array([1.0, -1.45, 0.75])  # from where; z is up
+FILLED = 0.82  # part of the window's height or width that the body takes
+DARK = "#222222"
+MANY_CELLS = 30_000  # edges of more cells would paint the body black
+
+
+def make_plotter(*, off_screen: bool) -> pyvista.Plotter:
+    """An empty white scene. Raises EnvironmentProblem where a window is wanted and there is no display."""
+    if not off_screen and not has_display():
+        raise EnvironmentProblem("there is no display to open a window on; use --screenshot FILE")
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # a missing X server is no news off screen
+    plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(SIZE))
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    return plotter
+
+
+def has_display() -> bool:
+    """Whether a window can be opened; other systems than Linux always have one."""
+    return platform.system() != "Linux" or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
+
+
+def surface(grid: pyvista.UnstructuredGrid) -> pyvista.PolyData:
+    """The outside, with its fields; curved cells are drawn curved."""
+    return grid.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=3)
+
+
+def matt(cells: int) -> dict[str, Any]:
+    """How add_mesh draws a body: colours little changed by light, thin edges."""
+    return {
+        "ambient": 0.42,
+        "diffuse": 0.66,
+        "specular": 0.0,
+        "show_edges": cells <= MANY_CELLS,
+        "edge_color": "#303030",
+        "edge_opacity": 0.35,
+        "line_width": 0.6,
+        "reset_camera": False,
+    }
+
+
+def frame(plotter: pyvista.Plotter, points: NDArray[np.float64], *, right: float = 0.0) -> None:
+    """Look at points (n, 3) from VIEW, z up, filling the window but a part on the right."""
+    towards = VIEW / np.linalg.norm(VIEW)
+    across = np.cross([0.0, 0.0, 1.0], towards)
+    across /= np.linalg.norm(across)
+    up = np.cross(towards, across)
+    seen = points @ np.column_stack([across, up])
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    wide, tall = plotter.window_size
+    aspect = wide / tall * (1 - right)
+    half = max((high - low)[1], (high - low)[0] / aspect) / 2 / FILLED
+    middle = (low + high) / 2 + np.array([half * wide / tall * right, 0.0])
+    depth = points @ towards
+    focus = middle[0] * across + middle[1] * up + depth.mean() * towards
+    camera = plotter.camera
+    camera.focal_point = focus
+    camera.position = focus + 4 * (half + np.ptp(depth)) * towards
+    camera.up = up
+    camera.parallel_projection = True
+    camera.parallel_scale = half
+    camera.clipping_range = (0.1 * half, 8 * (half + np.ptp(depth)))
+
+
+def write_texts(plotter: pyvista.Plotter, title: str, line: str, note: str) -> None:
+    """Title and a line in the upper left corner, the note at the bottom; each replaces the one before."""
+    tall = plotter.window_size[1]
+    for name, text, height, size, colour in (
+        ("title", title, tall - 52, 15, DARK),
+        ("line", line, tall - 88, 11, GREY),
+        ("note", note, 18, 8, GREY),
+    ):
+        if text:
+            plotter.add_text(text, position=(26, height), font_size=size, color=colour, name=name)
