@@ -16,6 +16,9 @@ from ancf_petsc.mesh.raw import Block, RawMesh, mesh_error
 FLAT = 1e-12
 """Cells whose determinant is smaller than this times (longest edge)^dimension are flat."""
 
+LARGEST = 1e100
+"""Coordinates must be smaller than this for volumes to be finite."""
+
 ASK_FOR = {
     "tetra": 'ask for mesh.element = "3413"',
     "tetra10": 'ask for mesh.element = "3-10-1-3", or mesh with linear tetrahedra',
@@ -62,7 +65,7 @@ def _sorted_nodes(raw: RawMesh, path: Path) -> tuple[Integers, Floats]:
         raise wrong("the file holds no nodes", cure="mesh the body and write the file again")
     order = np.argsort(raw.node_numbers, kind="stable")
     numbers, points = raw.node_numbers[order], np.ascontiguousarray(raw.points[order])
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(points) < LARGEST).all(axis=1))
     if len(bad):
         place = _place(points[bad[0]])
         raise wrong(

@@ -12,7 +12,7 @@ import numpy as np
 
 from ancf_petsc.errors import CaseError, did_you_mean
 from ancf_petsc.mesh.bodies import BODIES, Body, Plane
-from ancf_petsc.mesh.gmsh_file import gmsh_session
+from ancf_petsc.mesh.gmsh_session import gmsh_session
 from ancf_petsc.mesh.kinds import KINDS, KUHN, part_kind
 from ancf_petsc.mesh.mesh import Floats, Integers
 from ancf_petsc.mesh.parts import outer_sides, unique_rows

@@ -1,27 +1,34 @@
-"""Gmsh's files (.msh 1 to 4.1, text and binary), read by Gmsh itself.
+"""Gmsh's files (.msh 1 to 4.1, text and binary), read by Gmsh itself, in a process of its own.
 
-Gmsh is handed only files whose sections are whole. Two things it loses in files older than version 4 are
-kept here: elements of one entity in different physical groups (the two tags are swapped, so that its
-entities are the physical groups), and nodes no element uses.
+Two things Gmsh loses in files older than version 4 are kept here: which elements of one entity are in which
+physical group (the two tags are swapped, so that its entities are the physical groups), and nodes no element
+uses.
 """
 
 from __future__ import annotations
 
 import mmap
+import os
+import pickle
 import re
+import signal
+import subprocess
+import sys
 from collections import defaultdict
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ancf_petsc.errors import EnvironmentProblem
+from ancf_petsc.mesh import gmsh_child
 from ancf_petsc.mesh.kinds import BY_GMSH
 from ancf_petsc.mesh.mesh import Floats, Integers
 from ancf_petsc.mesh.raw import Block, RawMesh, mesh_error
 
 CURE = "the file may be truncated or damaged: write it again"
+
+Names = dict[tuple[int, int], str]
 
 
 class Header(NamedTuple):
@@ -32,45 +39,18 @@ class Header(NamedTuple):
     order: str
 
 
-@contextmanager
-def gmsh_session(**options: float) -> Iterator[Any]:
-    """The gmsh module with an empty model and silent; afterwards all is as it was before."""
-    import gmsh
-
-    running = gmsh.isInitialized()
-    if not running:
-        gmsh.initialize(interruptible=False, readConfigFiles=False)
-    current = gmsh.model.getCurrent()
-    wanted = {"General.Terminal": 0, **options}
-    before = {name: gmsh.option.getNumber(name) for name in wanted}
-    try:
-        for name, value in wanted.items():
-            gmsh.option.setNumber(name, value)
-        gmsh.model.add("ancf")
-        yield gmsh
-    finally:
-        if running:
-            gmsh.model.remove()
-            gmsh.model.setCurrent(current)
-            for name, value in before.items():
-                gmsh.option.setNumber(name, value)
-        else:
-            gmsh.finalize()
-
-
 def read_gmsh(path: Path) -> RawMesh:
     """The mesh in a .msh file."""
     with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         header = _checked_header(data, path)
         names = _physical_names(data)
         old = header.version < 4
-        with gmsh_session(**{"Mesh.SwitchElementTags": float(old)}) as gmsh:
-            _merge(gmsh, path)
-            membership = _old_membership(gmsh, names) if old else _membership(gmsh, names)
-            numbers, points = _nodes(gmsh)
-            blocks = _blocks(gmsh, membership)
+        found = _contents(path, swapped=old)
+        numbers, coordinates = found["nodes"]
+        numbers, points = numbers.astype(np.int64), coordinates.reshape(-1, 3)
         if old:
             numbers, points = _with_lost_nodes(data, header, numbers, points, path)
+    blocks = _blocks(found, names, old=old)
     groups = [*names.values(), *(name for block in blocks for name in block.names)]
     return RawMesh(numbers, points, blocks, list(dict.fromkeys(groups)))
 
@@ -85,95 +65,80 @@ def _checked_header(data: mmap.mmap, path: Path) -> Header:
         raise wrong(
             "not a Gmsh mesh: it does not begin with $MeshFormat", cure="write it again as .msh 2.2 or 4.1"
         )
-    for section, old in (("Nodes", "NOD"), ("Elements", "ELM")):
-        begun = data.find(b"$%b" % section.encode()) >= 0 or data.find(b"$%b" % old.encode()) >= 0
-        ended = data.find(b"$End%b" % section.encode()) >= 0 or data.find(b"$END%b" % old.encode()) >= 0
+    for section, old in ((b"Nodes", b"NOD"), (b"Elements", b"ELM")):
+        begun = data.find(b"$" + section) >= 0 or data.find(b"$" + old) >= 0
+        ended = data.find(b"$End" + section) >= 0 or data.find(b"$END" + old) >= 0
         if not (begun and ended):
             state = "is not finished" if begun else "is missing"
-            raise wrong(f"the section ${section} {state}", cure=CURE)
+            raise wrong(f"the section ${section.decode()} {state}", cure=CURE)
     if not re.search(rb"\$End\w+\s*\Z", data[-200:], re.IGNORECASE):
         raise wrong("the file ends inside a section", cure=CURE)
     if start[1] == b"NOD":
         return Header(1, binary=False, order="<")
-    header = re.fullmatch(r"(\d+(?:\.\d+)?)\s+([01])\s+\d+", start[2].decode("latin-1").strip())
+    line = start[2].decode("latin-1").strip()
+    header = re.fullmatch(r"(\d+(?:\.\d+)?)\s+([01])\s+\d+", line)
     if header is None:
-        raise wrong(
-            "the line after $MeshFormat is none",
-            got=start[2].decode("latin-1"),
-            expected="like 4.1 0 8",
-            cure=CURE,
-        )
+        raise wrong("the line after $MeshFormat", got=line, expected="like 4.1 0 8", cure=CURE)
     return Header(float(header[1]), header[2] == "1", "<" if data[start.end()] == 1 else ">")
 
 
-def _physical_names(data: mmap.mmap) -> dict[tuple[int, int], str]:
+def _physical_names(data: mmap.mmap) -> Names:
     """(dimension, tag) -> name, in the order of the file."""
     section = re.search(rb"\$PhysicalNames\s(.*?)\$EndPhysicalNames", data, re.DOTALL)
-    entries = (
-        re.findall(r'(\d+)\s+(-?\d+)\s+"([^"\n]*)"', section[1].decode("utf-8", "replace")) if section else []
-    )
+    lines = section[1].decode("utf-8", "replace") if section else ""
+    entries = re.findall(r'(\d+)\s+(-?\d+)\s+"([^"\n]*)"', lines)
     return {(int(dimension), abs(int(tag))): name for dimension, tag, name in entries}
 
 
-def _merge(gmsh: Any, path: Path) -> None:
-    """Gmsh reads the file into its current model."""
-    gmsh.logger.start()
-    try:
-        gmsh.merge(str(path))
-    except Exception as error:
-        said = [line.partition(": ")[2] for line in gmsh.logger.get() if line.startswith("Error")]
-        reason = " ".join((said[-1] if said else str(error)).split())
-        raise mesh_error(path)(f"Gmsh cannot read it ({reason or 'no reason given'})", cure=CURE) from None
-    finally:
-        gmsh.logger.stop()
+def _contents(path: Path, *, swapped: bool) -> dict[str, Any]:
+    """What `gmsh_child.contents` found in the file."""
+    command = [sys.executable, "-P", gmsh_child.__file__, str(path), str(int(swapped))]
+    # A Gmsh built with MPI must not take itself for a rank of this run.
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMI", "PMIX_", "MPI_"))}
+    child = subprocess.run(command, capture_output=True, env=environment, stdin=subprocess.DEVNULL)
+    if child.returncode == 0:
+        return pickle.loads(child.stdout)
+    reason = " ".join(child.stdout.decode("utf-8", "replace").split())
+    if child.returncode == gmsh_child.NO_GMSH:
+        raise EnvironmentProblem(f"Gmsh cannot be loaded ({reason}); install it: pip install gmsh")
+    if child.returncode < 0:
+        reason = f"it crashes, {signal.Signals(-child.returncode).name}"
+    raise mesh_error(path)(f"Gmsh cannot read it ({reason or 'no reason given'})", cure=CURE)
 
 
-def _name(names: dict[tuple[int, int], str], dimension: int, tag: int) -> str:
-    return names.get((dimension, tag)) or f"physical_{dimension}_{tag}"
-
-
-def _membership(gmsh: Any, names: dict[tuple[int, int], str]) -> dict[tuple[int, int], list[str]]:
-    """(dimension, entity) -> names of the physical groups it is in."""
-    groups = defaultdict(list)
-    for dimension, tag in gmsh.model.getPhysicalGroups():
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag):
-            groups[dimension, abs(int(entity))].append(_name(names, dimension, tag))
-    return groups
-
-
-def _old_membership(gmsh: Any, names: dict[tuple[int, int], str]) -> dict[tuple[int, int], list[str]]:
-    """The same where physical groups were read as entities; 0 is none."""
-    entities = [(dimension, abs(tag)) for dimension, tag in gmsh.model.getEntities()]
-    return {entity: [_name(names, *entity)] for entity in entities if entity[1]}
-
-
-def _nodes(gmsh: Any) -> tuple[Integers, Floats]:
-    numbers, coordinates, _ = gmsh.model.mesh.getNodes()
-    return numbers.astype(np.int64), coordinates.reshape(-1, 3)
-
-
-def _blocks(gmsh: Any, membership: dict[tuple[int, int], list[str]]) -> list[Block]:
+def _blocks(found: dict[str, Any], names: Names, *, old: bool) -> list[Block]:
     """Cells by entity and kind, mid-nodes in meshio's order."""
+    membership: dict[tuple[int, int], list[str]] = defaultdict(list)
+    for dimension, tag, entities in found["groups"] if not old else ():
+        for entity in entities:
+            membership[dimension, abs(entity)].append(_name(names, dimension, tag))
     blocks = []
-    for dimension, entity in gmsh.model.getEntities():
-        names = tuple(dict.fromkeys(membership.get((dimension, abs(entity)), ())))
-        kinds, numbers, nodes = gmsh.model.mesh.getElements(dimension, entity)
-        for kind, cells, corners in zip(kinds, numbers, nodes, strict=True):
-            corners = corners.astype(np.int64).reshape(len(cells), -1)
-            known = BY_GMSH.get(kind)
-            if known and known.gmsh_order:
-                corners = corners[:, known.gmsh_order]
-            name = known.name if known else gmsh.model.mesh.getElementProperties(kind)[0]
-            blocks.append(Block(name, cells.astype(np.int64), corners, names))
+    for dimension, entity, number, title, cells, nodes in found["elements"]:
+        if old:
+            groups = [_name(names, dimension, abs(entity))] if entity else []
+        else:
+            groups = membership[dimension, abs(entity)]
+        kind = BY_GMSH.get(number)
+        nodes = nodes.astype(np.int64).reshape(len(cells), -1)
+        if kind and kind.gmsh_order:
+            nodes = nodes[:, kind.gmsh_order]
+        name = kind.name if kind else title
+        blocks.append(Block(name, cells.astype(np.int64), nodes, tuple(dict.fromkeys(groups))))
     return blocks
+
+
+def _name(names: Names, dimension: int, tag: int) -> str:
+    return names.get((dimension, tag)) or f"physical_{dimension}_{tag}"
 
 
 def _with_lost_nodes(
     data: mmap.mmap, header: Header, numbers: Integers, points: Floats, path: Path
 ) -> tuple[Integers, Floats]:
     """All nodes of an old file: Gmsh forgets those no element uses."""
+    wrong = mesh_error(path)
     start = re.search(rb"\$(?:Nodes|NOD)\s*?\n\s*(\d+)[^\n]*\n", data)
-    assert start, "Gmsh has read this section"
+    if start is None:
+        raise wrong("the section $Nodes does not begin with a number", cure=CURE)
     count = int(start[1])
     if count == len(numbers):
         return numbers, points
@@ -183,8 +148,10 @@ def _with_lost_nodes(
         every, places = table["number"].astype(np.int64), table["point"].astype(float)
     else:
         lines = data[start.end() : data.find(b"$", start.end())].decode("latin-1")
-        values = np.fromstring(lines, sep=" ").reshape(-1, 4)
-        every, places = values[:, 0].astype(np.int64), values[:, 1:]
+        values = np.fromstring(lines, sep=" ")
+        if len(values) != 4 * count:
+            raise wrong(f"the section $Nodes holds {len(values) / 4:g} of {count} nodes", cure=CURE)
+        every, places = values.reshape(-1, 4)[:, 0].astype(np.int64), values.reshape(-1, 4)[:, 1:]
     if len(np.unique(every)) < count:
-        raise mesh_error(path)("a node number is given twice", cure=CURE)
+        raise wrong("a node number is given twice", cure=CURE)
     return every, places
