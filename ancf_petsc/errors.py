@@ -71,6 +71,12 @@ class NoEquilibrium(AncfError):
     exit_code = 3
 
 
+class MotionStopped(AncfError):
+    """The motion cannot be followed further: a step failed or numbers are not finite. What was before is saved."""
+
+    exit_code = 3
+
+
 class EnvironmentProblem(AncfError):
     """The machine lacks something: a package, a library, a launcher."""
 

@@ -2,6 +2,7 @@
 
 Up to DIRECT_LIMIT degrees of freedom MUMPS factors the symmetric tangent (LDLᵀ: it may be indefinite, and its negative pivots
 are counted). Above, conjugate gradients with algebraic multigrid that knows the rigid motions of the current configuration.
+In motion the mass keeps the matrix definite: PETSc's own factorisation, which has less to set up, serves small bodies.
 """
 
 from __future__ import annotations
@@ -11,15 +12,20 @@ from petsc4py import PETSc
 from ancf_petsc.system.assembly import Assembly
 
 DIRECT_LIMIT = 25_000
+SMALL = 3_000
 
 
 class LinearSolver:
-    """Sets up a KSP for the tangents of one assembly."""
+    """Sets up a KSP for the tangents of one assembly. moving: with the mass in them."""
 
-    def __init__(self, assembly: Assembly, ksp: PETSc.KSP) -> None:
+    def __init__(
+        self, assembly: Assembly, ksp: PETSc.KSP, *, moving: bool = False, symmetric: bool = True
+    ) -> None:
         self.assembly = assembly
         self.ksp = ksp
         self.dof = assembly.model.dof
+        self.symmetric = symmetric
+        self.small = moving and assembly.comm.size == 1 and self.dof <= SMALL
         self.direct = self.dof <= DIRECT_LIMIT
         self._configure()
 
@@ -27,10 +33,12 @@ class LinearSolver:
         pc = self.ksp.getPC()
         if self.direct:
             self.ksp.setType(PETSc.KSP.Type.PREONLY)
-            pc.setType(PETSc.PC.Type.CHOLESKY)
-            pc.setFactorSolverType("mumps")
+            pc.setType(PETSc.PC.Type.CHOLESKY if self.symmetric else PETSc.PC.Type.LU)
+            pc.setFactorSolverType("petsc" if self.small else "mumps")
+            if self.small:
+                pc.setFactorOrdering("qmd")
         else:
-            self.ksp.setType(PETSc.KSP.Type.CG)
+            self.ksp.setType(PETSc.KSP.Type.CG if self.symmetric else PETSc.KSP.Type.BCGS)
             self.ksp.setTolerances(rtol=1e-8, max_it=500)
             pc.setType(PETSc.PC.Type.GAMG)
             pc.setGAMGType("agg")

@@ -29,9 +29,8 @@ class MassSolver:
         self.free = model.motion[: model.owned] < 0
         small = mass.comm.size == 1 and model.owned <= LARGEST_TO_FACTOR
         self._factors = self._factor() if small and not mass.lumped else []
-        low, high = mass.bounds
-        root = sqrt(high / low)
-        self._iterations = ceil(log(ACCURACY / 2) / log((root - 1) / (root + 1))) if high > low else 1
+        root = sqrt(mass.bounds[1] / mass.bounds[0])
+        self._iterations = 1 if mass.lumped else ceil(log(ACCURACY / 2) / log((root - 1) / (root + 1)))
 
     def solve(self, b: NDArray) -> NDArray[np.float64]:
         """a (n, 3) from b (n, 3) on owned nodal vectors. Collective."""

@@ -28,6 +28,20 @@ def petsc_options(given: Mapping[str, object]) -> Iterator[None]:
             database.delValue(name)
 
 
+@contextmanager
+def default_options(defaults: Mapping[str, object]) -> Iterator[None]:
+    """Options for the time of a `setFromOptions`, for what has no binding; those of case and command line stay stronger."""
+    database = PETSc.Options()
+    added = [name for name in defaults if not database.hasName(name)]
+    for name in added:
+        database.setValue(name, _text(defaults[name]))
+    try:
+        yield
+    finally:
+        for name in added:
+            database.delValue(name)
+
+
 def unused_options(given: Mapping[str, object]) -> list[str]:
     """Names of the options that no PETSc object has asked for so far."""
     return [name for name in given if not _used(name)]

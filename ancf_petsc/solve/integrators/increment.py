@@ -1,0 +1,156 @@
+"""Newton for the increment d = x1 - x0 of one implicit step: free of the rounding a position as unknown would bring.
+
+A factored matrix is kept from iteration to iteration and from step to step as long as it does its work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ancf_petsc.solve.equations import Equations
+from ancf_petsc.solve.linear import LinearSolver
+from ancf_petsc.solve.petsc import default_options
+
+Reason = PETSc.SNES.ConvergedReason
+MOST_ITERATIONS = 25
+SLOW = 0.3  # a residual that falls by less asks for a new matrix: factoring costs some five iterations
+ROUNDING = 2e-15
+WORDS = {
+    Reason.DIVERGED_FNORM_NAN: "forces are not finite",
+    Reason.DIVERGED_MAX_IT: f"no convergence in {MOST_ITERATIONS} Newton iterations",
+    Reason.DIVERGED_LINE_SEARCH: "no step along Newton's direction lowers the out-of-balance force",
+    Reason.DIVERGED_LINEAR_SOLVE: "the linear solver failed",
+    Reason.DIVERGED_DTOL: "Newton runs away",
+}
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Out-of-balance force (n, 3) with the values on driven nodal vectors left in, and the squared force scale here."""
+
+    values: NDArray[np.float64]
+    scale: float
+
+
+class ForceTest:
+    """Convergence: out-of-balance force against the largest force at work. Tells whether the matrix has aged."""
+
+    def __init__(self, equations: Equations) -> None:
+        self.equations = equations
+        self.scale = 0.0
+        self.aged = True
+        self._before = np.inf
+
+    def note_scale(self, squared: float) -> None:
+        """The squared norm of the forces on this rank, of the residual computed last."""
+        self.scale = squared
+
+    def __call__(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
+        residual = norms[2]
+        if not np.isfinite(residual):
+            return Reason.DIVERGED_FNORM_NAN
+        assembly = self.equations.assembly
+        forces = np.sqrt(self.equations.comm.allreduce(self.scale, MPI.SUM))
+        floor = ROUNDING * assembly.largest_diagonal * assembly.model.size
+        relative, absolute = snes.getTolerances()[:2]
+        if iteration:
+            self.aged = self.aged or residual > SLOW * self._before
+        self._before = residual
+        if residual <= max(relative * forces, floor, absolute):
+            return Reason.CONVERGED_FNORM_RELATIVE
+        return Reason.ITERATING
+
+
+class IncrementSolver:
+    """Solves forces(d) = 0 on the free degrees of freedom; d carries the increments of the driven ones.
+
+    x: the state. forces(d) -> Forces. tangent(d, matrix) fills the matrix with the derivative. relative: the tolerance.
+    """
+
+    def __init__(
+        self,
+        equations: Equations,
+        x: PETSc.Vec,
+        forces: Callable[[PETSc.Vec], Forces],
+        tangent: Callable[[PETSc.Vec, PETSc.Mat], None],
+        *,
+        symmetric: bool,
+        relative: float,
+    ) -> None:
+        self.equations, self.x = equations, x
+        self.assembly = equations.assembly
+        self.forces, self.tangent, self.relative = forces, tangent, relative
+        self.matrix = self.assembly.create_matrix(symmetric=symmetric)
+        self.d = self.assembly.vector()
+        self.test = ForceTest(equations)
+        self.newton = self.linear_iterations = 0
+        self._always_new = False
+        self._residual = self.assembly.vector()
+        self._quick = self._create("basic")
+        self.linear = LinearSolver(self.assembly, self._quick.getKSP(), moving=True, symmetric=symmetric)
+        with default_options({"snes_linesearch_type": "basic"}):
+            self._quick.setFromOptions()
+        self._careful = self._create("bt")
+        self._careful.setKSP(self._quick.getKSP())
+        with default_options({"snes_linesearch_type": "bt"}):
+            self._careful.setFromOptions()
+
+    def _create(self, search: str) -> PETSc.SNES:
+        snes = PETSc.SNES().create(self.equations.comm)
+        snes.setType(PETSc.SNES.Type.NEWTONLS)
+        snes.setFunction(self._function, self._residual)
+        snes.setJacobian(self._jacobian, self.matrix)
+        snes.setConvergenceTest(self.test)
+        snes.setTolerances(rtol=self.relative, atol=0.0, max_it=MOST_ITERATIONS)
+        return snes
+
+    def solve(self, guess: NDArray) -> str | None:
+        """Start from guess (n, 3); the answer is in `d`. Returns None, or in words why there is none. Collective."""
+        self.newton = self.linear_iterations = 0
+        self.d.array[:] = guess.ravel()
+        reason = self._run(self._quick)
+        if reason <= 0:
+            self.test.aged = self._always_new = True
+            driven = self.assembly.driven
+            self.d.array[:] = 0.0
+            self.d.array[driven] = guess.ravel()[driven]
+            reason = self._run(self._careful)
+            self._always_new = False
+        return None if reason > 0 else WORDS.get(reason, f"PETSc's reason {reason}")
+
+    def set_up(self) -> None:
+        """Fill the matrix at d and set the linear solver up."""
+        self._jacobian(self._quick, self.d, self.matrix, self.matrix)
+        self.linear.ksp.setOperators(self.matrix)
+        self._quick.setUp()
+        self.linear.ksp.setUp()
+
+    def destroy(self) -> None:
+        """Free PETSc's objects."""
+        for item in (self._careful, self._quick, self.matrix, self.d, self._residual):
+            item.destroy()
+
+    def _run(self, snes: PETSc.SNES) -> int:
+        snes.solve(None, self.d)
+        self.newton += snes.getIterationNumber()
+        self.linear_iterations += snes.getLinearSolveIterations()
+        return snes.getConvergedReason()
+
+    def _function(self, snes: PETSc.SNES, d: PETSc.Vec, f: PETSc.Vec) -> None:
+        forces = self.forces(d)
+        values = forces.values.ravel()
+        values[self.assembly.driven] = 0.0
+        self.test.note_scale(forces.scale)
+        f.array[:] = values
+
+    def _jacobian(self, snes: PETSc.SNES, d: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
+        if self.test.aged or self._always_new:
+            self.tangent(d, P)
+            self.linear.know_rigid_motions(P, self.x)
+            self.test.aged = False
