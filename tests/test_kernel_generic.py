@@ -215,11 +215,11 @@ def test_forces_are_the_sums_of_the_theory(code):
     weights = rule.weights * cell.geometry.determinant[0]
     force = np.einsum("q,qij,qjk,qak->ai", weights, F, S, gradients)
     energy = 0.5 * np.einsum("q,qij,qij->", weights, S, E)
-    np.testing.assert_allclose(
-        cell.force(cell.positions)[:, :d], force, rtol=0, atol=1e-13 * abs(force).max()
-    )
+    # FᵀF - I of a small strain cancels: what is left is rounding of the positions times the stiffness.
+    rounding = 1e-14 * abs(cell.tangent(cell.positions)).max()
+    np.testing.assert_allclose(cell.force(cell.positions)[:, :d], force, rtol=0, atol=rounding)
     assert abs(cell.force(cell.positions)[:, d:]).max(initial=0) == 0
-    assert cell.energy(cell.positions) == pytest.approx(energy, rel=1e-13)
+    assert cell.energy(cell.positions) == pytest.approx(energy, rel=1e-11)
 
 
 def test_thickness_and_plane_stress():
