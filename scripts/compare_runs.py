@@ -16,6 +16,7 @@ import matplotlib as mpl
 
 import ancf_petsc as ancf
 from ancf_petsc.post.curves import energy_absorbed, energy_loaded, initial_stiffness, secant_stiffness
+from ancf_petsc.post.units import read_units, with_unit
 
 
 def main() -> int:
@@ -66,10 +67,11 @@ def draw(runs: list[ancf.Results], file: Path) -> None:
     figure, axes = plt.subplots(figsize=(7.5, 4.5), layout="constrained")
     for run in runs:
         axes.plot(run.curve["stroke"], run.curve["force"], marker=".", label=run.title)
-    axes.set_xlabel(f"stroke ({runs[0].units})")
-    axes.set_ylabel(f"force ({runs[0].units})")
+    units = read_units(runs[0].units)
+    axes.set_xlabel(with_unit("stroke", units.length))
+    axes.set_ylabel(with_unit("force", units.force))
     axes.grid(color="#e4e4e4")
-    figure.legend(loc="outside lower center")
+    axes.legend()
     for note in dict.fromkeys(run.note for run in runs if run.note):
         figure.supxlabel(note, fontsize=8)
     figure.savefig(file, dpi=200)

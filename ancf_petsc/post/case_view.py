@@ -68,7 +68,7 @@ def scene(
         plotter.add_mesh(_shape(mesh, group), color=colour, reset_camera=False, **_paint(mesh, group))
         _add_label(plotter, mesh.points[group.nodes].mean(axis=0), words[group.name], colour)
     marks = [_add_marks(plotter, mesh, support) for support in supports]
-    frame(plotter, np.vstack([mesh.points[mesh.used], *marks]))
+    frame(plotter, [mesh.points[mesh.used], *(reached for reached in marks if len(reached))])
     line = f"{int(mesh.used.sum())} nodes, {len(mesh.cells)} cells; cones: held, arrows: moved or pushed"
     write_texts(plotter, title, line, note)
     return plotter

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -21,14 +22,18 @@ DARK = "#222222"
 MANY_CELLS = 30_000  # edges of more cells would paint the body black
 
 
-def make_plotter(*, off_screen: bool) -> pyvista.Plotter:
-    """An empty white scene. Raises EnvironmentProblem where a window is wanted and there is no display."""
+def make_plotter(*, off_screen: bool, smooth: bool = True) -> pyvista.Plotter:
+    """An empty white scene; smooth: without steps along edges, which takes most of a picture's time.
+
+    Raises EnvironmentProblem where a window is wanted and there is no display.
+    """
     if not off_screen and not has_display():
         raise EnvironmentProblem("there is no display to open a window on; use --screenshot FILE")
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # a missing X server is no news off screen
     plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(SIZE))
     plotter.set_background("white")
-    plotter.enable_anti_aliasing("ssaa")
+    if smooth:
+        plotter.enable_anti_aliasing("ssaa" if off_screen else "msaa")
     return plotter
 
 
@@ -58,27 +63,29 @@ def matt(cells: int) -> dict[str, Any]:
     }
 
 
-def frame(plotter: pyvista.Plotter, points: NDArray[np.float64], *, right: float = 0.0) -> None:
-    """Look at points (n, 3) from VIEW, z up, filling the window but a part on the right."""
+def frame(plotter: pyvista.Plotter, positions: Iterable[NDArray[np.float64]], *, right: float = 0.0) -> None:
+    """Look at all positions, arrays (n, 3), from VIEW, z up, filling the window but a part on the right."""
     towards = VIEW / np.linalg.norm(VIEW)
     across = np.cross([0.0, 0.0, 1.0], towards)
     across /= np.linalg.norm(across)
     up = np.cross(towards, across)
-    seen = points @ np.column_stack([across, up])
-    low, high = seen.min(axis=0), seen.max(axis=0)
+    axes = np.column_stack([across, up, towards])
+    ends = np.array(
+        [[seen.min(axis=0), seen.max(axis=0)] for seen in (points @ axes for points in positions)]
+    )
+    low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
     wide, tall = plotter.window_size
     aspect = wide / tall * (1 - right)
-    half = max((high - low)[1], (high - low)[0] / aspect) / 2 / FILLED
-    middle = (low + high) / 2 + np.array([half * wide / tall * right, 0.0])
-    depth = points @ towards
-    focus = middle[0] * across + middle[1] * up + depth.mean() * towards
+    width, height, depth = high - low
+    half = max(height, width / aspect) / 2 / FILLED
+    focus = axes @ ((low + high) / 2 + np.array([half * wide / tall * right, 0.0, 0.0]))
     camera = plotter.camera
     camera.focal_point = focus
-    camera.position = focus + 4 * (half + np.ptp(depth)) * towards
+    camera.position = focus + 4 * (half + depth) * towards
     camera.up = up
     camera.parallel_projection = True
     camera.parallel_scale = half
-    camera.clipping_range = (0.1 * half, 8 * (half + np.ptp(depth)))
+    camera.clipping_range = (0.1 * half, 8 * (half + depth))
 
 
 def write_texts(plotter: pyvista.Plotter, title: str, line: str, note: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -85,22 +86,25 @@ def label(results: Results, look: Look) -> str:
 class Scene:
     """The body in a plotter; `show` moves it to a step."""
 
-    def __init__(self, results: Results, look: Look, steps: range, *, off_screen: bool) -> None:
+    def __init__(
+        self, results: Results, look: Look, steps: range, *, off_screen: bool, smooth: bool = True
+    ) -> None:
         """steps: those the colours and the frame have to hold for."""
-        if len(results.times) == 0:
-            raise CaseError("the run has no output yet", file=results.path)
         self.results = results
         self.look = look
         self.limits, self.clipped = _limits([scalars(results, look, step) for step in steps])
         self.colours = "RdBu_r" if self.limits[0] < 0 < self.limits[1] else "viridis"
-        self.plotter = make_plotter(off_screen=off_screen)
+        self.plotter = make_plotter(off_screen=off_screen, smooth=smooth)
         if look.undeformed:
             outline = surface(results.mesh(0, scale=0.0, fields=())).extract_feature_edges(25)
             self.plotter.add_mesh(outline, color=GREY, line_width=1.2, opacity=0.8)
-        ends = [results.points] if look.undeformed else []
-        for step in (steps[0], steps[-1]):
-            ends.append(results.points + look.scale * results.field("displacement", step))
-        frame(self.plotter, np.vstack(ends), right=0.12)
+        frame(self.plotter, self._positions(steps), right=0.12)
+
+    def _positions(self, steps: range) -> Iterator[NDArray[np.float64]]:
+        if self.look.undeformed:
+            yield self.results.points
+        for step in steps:
+            yield self.results.points + self.look.scale * self.results.field("displacement", step)
 
     def show(self, step: int) -> None:
         """The body, the time and the stroke at a step counted from 0."""
@@ -180,7 +184,7 @@ def describe(results: Results, look: Look, step: int) -> str:
 
 def screenshot(results: Results, look: Look, step: int, file: Path) -> None:
     """A picture of one step."""
-    step = step % len(results.times)
+    step = results.step_number(step)
     scene = Scene(results, look, range(step, step + 1), off_screen=True)
     scene.show(step)
     scene.plotter.screenshot(str(file))
@@ -191,13 +195,15 @@ def movie(results: Results, look: Look, file: Path, *, seconds: float = 5.0) -> 
     """An animated GIF of all steps."""
     from PIL import Image
 
-    count = len(results.times)
-    scene = Scene(results, look, range(count), off_screen=True)
+    count = results.step_number(-1) + 1
+    scene = Scene(
+        results, look, range(count), off_screen=True, smooth=False
+    )  # halving the picture smooths it
     frames = []
     for step in range(count):
         scene.show(step)
         picture = Image.fromarray(scene.plotter.screenshot(return_img=True))
-        frames.append(picture.resize((picture.width // 2, picture.height // 2)).quantize(128))
+        frames.append(picture.resize((picture.width // 2, picture.height // 2)).quantize(256))
     scene.plotter.close()
     milliseconds = [max(20, round(1000 * seconds / count))] * (count - 1) + [1000]
     frames[0].save(file, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0)
@@ -205,19 +211,22 @@ def movie(results: Results, look: Look, file: Path, *, seconds: float = 5.0) -> 
 
 def explore(results: Results, look: Look, step: int) -> None:
     """A window with the body to turn around and a slider over the steps."""
-    count = len(results.times)
+    count, step = len(results.times), results.step_number(step)
     scene = Scene(results, look, range(count), off_screen=False)
-    scene.show(step % count)
+    scene.show(step)
     if count > 1:
         scene.plotter.add_slider_widget(
             lambda value: scene.show(round(value)),
             (0, count - 1),
-            value=step % count,
+            value=step,
             title="step",
             fmt="%.0f",
             pointa=(0.3, 0.07),
             pointb=(0.7, 0.07),
             color=DARK,
             style="modern",
+            slider_width=0.02,
+            tube_width=0.006,
+            title_height=0.02,
         )
     scene.plotter.show(title=results.title)

@@ -120,7 +120,7 @@ class Results:
         """Values (n, ...) over nodes or (e, ...) over cells at a step, counted from 0 or from the end."""
         if name not in self.fields:
             raise CaseError("no such field", file=self.path, got=name, cure=did_you_mean(name, self.fields))
-        return self._dataset(f"steps/{self._steps[self._index(step)]}/{link_name(name)}")
+        return self._dataset(f"steps/{self._steps[self.step_number(step)]}/{link_name(name)}")
 
     def step_at(self, time: float) -> int:
         """The step nearest to a time."""
@@ -141,7 +141,8 @@ class Results:
             data[name] = self.field(name, step)
         return grid
 
-    def _index(self, step: int) -> int:
+    def step_number(self, step: int) -> int:
+        """A step counted from 0, given from 0 or from the end (-1); CaseError where there is none."""
         count = len(self._steps)
         if not -count <= step < count:
             raise CaseError(
