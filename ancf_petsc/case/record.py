@@ -106,7 +106,7 @@ class Record:
     def _energies(self, x: PETSc.Vec, more: Mapping[str, float]) -> dict[str, float]:
         """Energies and work of the whole body: symmetry counts."""
         symmetry = self.spec.output.symmetry
-        given = {name: value for name, value in more.items() if name.endswith(("_energy", "_work"))}
+        given = {name: value for name, value in more.items() if name.endswith(("_energy", "_work", "_drift"))}
         whole = {"strain_energy": self.assembly.strain_energy(x), **given}
         return {name: symmetry * value for name, value in whole.items()}
 

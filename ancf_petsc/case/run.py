@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import logging
 import resource
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from mpi4py import MPI
 
-from ancf_petsc.case.blueprint import Blueprint, draw, output_times
+from ancf_petsc.case.blueprint import Blueprint, draw
 from ancf_petsc.case.build import Built, build_from
 from ancf_petsc.case.clock import Clock
 from ancf_petsc.case.load import Case
-from ancf_petsc.case.quasi_static import QuasiStaticRun
+from ancf_petsc.case.load_path import Statics
+from ancf_petsc.case.motion import Motion
 from ancf_petsc.case.record import Record
 from ancf_petsc.case.signals import StopRequest
 from ancf_petsc.case.versions import program_version, versions
@@ -23,9 +24,7 @@ from ancf_petsc.log import log_file
 from ancf_petsc.material import law_named
 from ancf_petsc.parallel.exchange import agree, on_root
 from ancf_petsc.results.folder import check_folder, claim_folder, write_summary
-from ancf_petsc.solve.newton import Newton
 from ancf_petsc.solve.petsc import petsc_options, refuse_unused
-from ancf_petsc.system.assembly import Assembly
 
 log = logging.getLogger("ancf")
 
@@ -42,8 +41,8 @@ def run_case(
     """Solve a case and leave its results in a folder, which is returned. Collective.
 
     folder: default results/NAME. force: overwrite a folder that holds something else. imports: seconds
-    spent before. watch: told the part of the path done, 0 to 1. Raises CaseError, NoEquilibrium, Interrupted;
-    what was computed before is saved.
+    spent before. watch: told the part of the path done, 0 to 1. Raises CaseError, NoEquilibrium,
+    MotionStopped, Interrupted; what was computed before is saved.
     """
     folder = Path(folder) if folder else Path("results") / case.name
     clock = Clock(imports)
@@ -55,14 +54,17 @@ def run_case(
             _compile(case, comm)
             built = build_from(case, blueprint, comm)
             del blueprint
-            newton = Newton(Assembly(built.model), case.spec.statics.tolerance)
+            solver = Motion(case, built) if case.spec.dynamics else Statics(case, built)
+        try:
             if case.spec.petsc:
-                newton.prepare()
-                agree(comm, lambda: refuse_unused(case.spec.petsc))
-        on_root(comm, lambda: claim_folder(folder))
-        with log_file(folder / "log.txt", comm.rank):
-            _solve(case, built, newton, folder, clock, watch)
-        newton.destroy()
+                with clock.part("setup"):
+                    solver.prepare()
+                    agree(comm, lambda: refuse_unused(case.spec.petsc))
+            on_root(comm, lambda: claim_folder(folder))
+            with log_file(folder / "log.txt", comm.rank):
+                _solve(case, built, solver, folder, clock, watch)
+        finally:
+            solver.destroy()
     return folder
 
 
@@ -82,17 +84,20 @@ def _compile(case: Case, comm: MPI.Comm) -> None:
 
 
 def _solve(
-    case: Case, built: Built, newton: Newton, folder: Path, clock: Clock, watch: Callable[[float], None]
+    case: Case,
+    built: Built,
+    solver: Statics | Motion,
+    folder: Path,
+    clock: Clock,
+    watch: Callable[[float], None],
 ) -> None:
-    """Follow the path; whatever happens, the summary says how it ended."""
-    comm = newton.comm
-    log.info("%s", describe(case, built, newton))
+    """Follow the path or the motion; whatever happens, the summary says how it ended."""
+    comm = solver.assembly.comm
+    log.info("%s; solver: %s", describe(case, built), solver.describe())
     with clock.part("output"):
-        record = Record(folder, case.spec, built, newton.assembly, program_version())
+        record = Record(folder, case.spec, built, solver.assembly, program_version())
     stop = StopRequest(comm)
-    times = output_times(case.spec, case.file)
-    statics = case.spec.statics
-    run = QuasiStaticRun(newton, record, times, statics.smallest_step, clock, watch, stop.asked)
+    run = solver.begin(record, clock, watch, stop.asked)
     status = "stopped"
     try:
         with stop.watched(), clock.part("solve"):
@@ -103,21 +108,29 @@ def _solve(
         raise
     finally:
         record.close()
-        _summarise(case, built, folder, status, clock, run, comm)
+        _summarise(case, built, folder, status, clock, run.totals, record.row, solver.facts(), comm)
 
 
-def describe(case: Case, built: Built, newton: Newton) -> str:
-    """One paragraph on what is solved and how."""
+def describe(case: Case, built: Built) -> str:
+    """One line on the body."""
     laws = ", ".join(dict.fromkeys(region.law.title for region in built.model.regions))
+    ranks = built.model.comm.size
     return (
         f"{case.spec.title}: {built.order.total_nodes} nodes, {built.order.total_cells} elements "
-        f"{case.spec.mesh.element}, {laws}, {newton.comm.size} rank{'s' * (newton.comm.size > 1)}; "
-        f"solver: {newton.linear.describe()}"
+        f"{case.spec.mesh.element}, {laws}, {ranks} rank{'s' * (ranks > 1)}"
     )
 
 
 def _summarise(
-    case: Case, built: Built, folder: Path, status: str, clock: Clock, run: QuasiStaticRun, comm: MPI.Comm
+    case: Case,
+    built: Built,
+    folder: Path,
+    status: str,
+    clock: Clock,
+    totals: Mapping[str, int],
+    final: Mapping[str, float],
+    facts: Mapping[str, float],
+    comm: MPI.Comm,
 ) -> None:
     memory = comm.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
     dof = built.model.dof
@@ -132,11 +145,10 @@ def _summarise(
             elements=built.order.total_cells,
             dof=dof,
             ranks=comm.size,
-            iterations={
-                "newton": run.totals["newton_iterations"],
-                "linear": run.totals["linear_iterations"],
-            },
-            final=run.record.row,
+            iterations={"newton": totals["newton_iterations"], "linear": totals["linear_iterations"]},
+            final=final,
             versions=versions(),
             note=case.spec.note,
+            steps=totals["steps"],
+            **facts,
         )

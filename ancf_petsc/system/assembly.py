@@ -239,6 +239,13 @@ class Assembly:
             *self.graph, mass, factor, *self._pointers, self._split, self._driven_bits, self._values
         )
 
+    def fill_mass(self, matrix: PETSc.Mat, mass: NDArray) -> None:
+        """Fill the matrix with a mass; driven degrees of freedom get none."""
+        self._values[:] = 0.0
+        self.add_mass(mass, 1.0)
+        matrix.stateIncrease()
+        matrix.assemble()
+
     def _finish(self, matrix: PETSc.Mat) -> None:
         """One number on the diagonal of all driven degrees of freedom: the mean of the others."""
         values = self._values

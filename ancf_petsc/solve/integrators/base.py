@@ -65,6 +65,11 @@ class Integrator(ABC):
         """Whether the method chooses its steps."""
         return self.settings.step is None
 
+    @property
+    def longest_stable(self) -> float | None:
+        """The longest stable fixed step of an explicit method; None for implicit ones."""
+        return None
+
     @abstractmethod
     def advance(self, goal: float) -> Step:
         """One step: to `goal`, or, where the method adapts, at most to `goal`. Raises MotionStopped."""

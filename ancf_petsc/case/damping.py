@@ -1,0 +1,77 @@
+"""The damping alpha of a case: a number, or critical for a mode: alpha = 4 pi / T, Olshevskiy et al. (2017), Eq. (16)."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from math import pi, sqrt
+
+from petsc4py import PETSc
+
+from ancf_petsc.case.load import Case
+from ancf_petsc.case.schema import CriticalMode
+from ancf_petsc.errors import CaseError, NoEquilibrium
+from ancf_petsc.solve.newton import Newton
+from ancf_petsc.solve.statics import LoadPath
+from ancf_petsc.system.assembly import Assembly
+from ancf_petsc.system.mass import Mass
+from ancf_petsc.system.ramp import Ramp
+
+STATIC_TOLERANCE, SMALLEST_STEP = 1e-9, 1e-3
+log = logging.getLogger("ancf")
+
+
+def damping_of(case: Case, assembly: Assembly, mass: Mass) -> float:
+    """alpha in 1 / unit of time. Raises CaseError where there is no such mode. Collective."""
+    asked = case.spec.dynamics.damping  # type: ignore[union-attr]
+    if isinstance(asked, CriticalMode):
+        x = assembly.reference_vector()
+        number, state = asked.critical, "the unloaded body"
+    elif asked == "critical":
+        x = static_answer(case, assembly)
+        number, state = 1, "the body under its loads at rest"
+    else:
+        return float(asked)
+    from ancf_petsc.solve.modes import modes_at
+
+    modes = modes_at(assembly, mass, x, number)
+    x.destroy()
+    rigid = 1e-9 * assembly.largest_diagonal / max(assembly.comm.allgather(mass.diagonal.max(initial=0.0)))
+    if len(modes.omega_squared) < number or modes.omega_squared[number - 1] <= rigid:
+        raise _refused(case, f"mode {number} of {state} does not vibrate: it is a rigid motion or unstable")
+    omega = sqrt(modes.omega_squared[number - 1])
+    period, alpha = 2 * pi / omega, 2 * omega
+    log.info("critical damping of mode %d of %s: period %.6g, alpha = 4 pi / T = %.6g", number, state, period, alpha)
+    return alpha
+
+
+def static_answer(case: Case, assembly: Assembly) -> PETSc.Vec:
+    """The body at rest under its loads and moves as they are at the end. Collective."""
+    model = assembly.model
+    linear = Ramp("linear")
+    loads = [
+        replace(load, pattern=load.ramp.value(1.0) * load.pattern, ramp=linear) for load in model.loads
+    ]
+    motions = [
+        replace(motion, amplitude=motion.value(1.0), ramp=linear) if motion.amplitude else motion
+        for motion in model.motions
+    ]
+    newton = Newton(Assembly(replace(model, loads=loads, motions=motions)), STATIC_TOLERANCE)
+    path = LoadPath(newton, [1.0], [], SMALLEST_STEP, lambda step, x: None)
+    try:
+        path.run()
+    except NoEquilibrium as error:
+        raise _refused(case, f"there is no static answer to the loads ({error})") from error
+    finally:
+        newton.destroy()
+    return path.x
+
+
+def _refused(case: Case, why: str) -> CaseError:
+    return CaseError(
+        why,
+        file=case.file,
+        key="dynamics.damping",
+        expected="a mode to damp critically",
+        cure="give a number, or { critical = n } with a mode of the unloaded body that vibrates (ancf modes lists them)",
+    )

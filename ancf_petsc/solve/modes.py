@@ -1,0 +1,91 @@
+"""Frequencies and shapes of small vibrations about a state, by SLEPc: K phi = omega^2 M phi."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from slepc4py import SLEPc
+
+from ancf_petsc.errors import AncfError
+from ancf_petsc.system.assembly import Assembly
+from ancf_petsc.system.mass import Mass
+
+TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True)
+class Modes:
+    """omega_squared (m,) ascending, negative where the state is unstable; shapes (m, n, 3), of mass 1, on owned nodal vectors."""
+
+    omega_squared: NDArray[np.float64]
+    shapes: NDArray[np.float64]
+
+    @property
+    def frequencies(self) -> NDArray[np.float64]:
+        """Cycles per unit of time (m,); 0 where omega squared is not positive."""
+        return np.sqrt(np.maximum(self.omega_squared, 0.0)) / (2 * np.pi)
+
+
+def modes_at(assembly: Assembly, mass: Mass, x: PETSc.Vec, count: int) -> Modes:
+    """The `count` modes of lowest omega squared of the tangent at x, driven degrees of freedom held. Collective.
+
+    Driven degrees of freedom have stiffness but no mass: their eigenvalues are infinite and never seen. The inverse is taken at
+    a shift below zero, about the lowest omega squared of the body's size, so that rigid motions do no harm.
+    """
+    stiffness = assembly.create_matrix()
+    assembly.tangent(x, stiffness)
+    carrier = Assembly(assembly.model)
+    inertia = carrier.create_matrix()
+    carrier.fill_mass(inertia, mass.values)
+    free = assembly.comm.allreduce(int((assembly.model.motion[: assembly.model.owned] < 0).sum()))
+    solver = _solver(assembly, stiffness, inertia, min(count, free), _shift(assembly, mass))
+    try:
+        solver.solve()
+        found = solver.getConverged()
+        if found < min(count, free):
+            raise AncfError(f"only {found} of {count} modes were found: ask for fewer, or look at the material")
+        return _collect(solver, assembly, min(count, free))
+    finally:
+        for item in (solver, inertia, stiffness):
+            item.destroy()
+
+
+def _shift(assembly: Assembly, mass: Mass) -> float:
+    """A small negative number on the scale of omega squared: stiffness over mass, over the number of nodes squared."""
+    own = float(mass.diagonal.max(initial=0.0))
+    heaviest = max(assembly.comm.allgather(own))
+    nodes = assembly.model.dof / 3
+    return -1e-3 * assembly.largest_diagonal / heaviest / nodes ** (4 / 3)
+
+
+def _solver(assembly: Assembly, K: PETSc.Mat, M: PETSc.Mat, count: int, shift: float) -> SLEPc.EPS:
+    solver = SLEPc.EPS().create(assembly.comm)
+    solver.setOptionsPrefix("modes_")
+    solver.setOperators(K, M)
+    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    solver.setDimensions(nev=count)
+    solver.setTolerances(TOLERANCE, 500)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    solver.setTarget(shift)
+    transform = solver.getST()
+    transform.setType(SLEPc.ST.Type.SINVERT)
+    ksp = transform.getKSP()
+    ksp.setType(PETSc.KSP.Type.PREONLY)
+    ksp.getPC().setType(PETSc.PC.Type.CHOLESKY)
+    ksp.getPC().setFactorSolverType("mumps")
+    solver.setFromOptions()
+    return solver
+
+
+def _collect(solver: SLEPc.EPS, assembly: Assembly, count: int) -> Modes:
+    values, shapes = np.empty(count), np.empty((count, assembly.model.owned, 3))
+    shape = assembly.vector()
+    for k in range(count):
+        values[k] = solver.getEigenpair(k, shape).real
+        shapes[k] = shape.array_r.reshape(-1, 3)
+    shape.destroy()
+    order = np.argsort(values, kind="stable")
+    return Modes(values[order], shapes[order])
