@@ -50,7 +50,7 @@ def make_mesh(
     if divisions is None and not hexahedra:
         points, cells = _unstructured(body, body.size if size is None else size)
     else:
-        points, cells = _bricks(body.grid(body.divisions if divisions is None else divisions))
+        points, cells = bricks(body.grid(body.divisions if divisions is None else divisions))
         if not hexahedra:
             cells = cells[:, np.array(KUHN)].reshape(-1, 4)
     kind = part_kind(3, cells.shape[1]).name
@@ -98,7 +98,7 @@ def _unstructured(body: Body, size: float) -> tuple[Floats, Integers]:
     return coordinates.reshape(-1, 3)[order], cells
 
 
-def _bricks(grid: Floats) -> tuple[Floats, Integers]:
+def bricks(grid: Floats) -> tuple[Floats, Integers]:
     """Points (n, 3), x running fastest, and bricks (e, 8) of a grid (nz + 1, ny + 1, nx + 1, 3)."""
     index = np.arange(grid[..., 0].size).reshape(grid.shape[:3])
     lower = [index[:-1, :-1, :-1], index[:-1, :-1, 1:], index[:-1, 1:, 1:], index[:-1, 1:, :-1]]

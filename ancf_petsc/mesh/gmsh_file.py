@@ -101,9 +101,11 @@ def _contents(path: Path, *, swapped: bool) -> dict[str, Any]:
     reason = " ".join(child.stdout.decode("utf-8", "replace").split())
     if child.returncode == gmsh_child.NO_GMSH:
         raise EnvironmentProblem(f"Gmsh cannot be loaded ({reason}); install it: pip install gmsh")
+    wrong = mesh_error(path)
     if child.returncode < 0:
-        reason = f"it crashes, {signal.Signals(-child.returncode).name}"
-    raise mesh_error(path)(f"Gmsh cannot read it ({reason or 'no reason given'})", cure=CURE)
+        cure = "the file may be truncated or damaged, or elements refer to nodes it lacks: write it again"
+        raise wrong(f"Gmsh crashes on it ({signal.Signals(-child.returncode).name})", cure=cure)
+    raise wrong(f"Gmsh cannot read it ({reason or 'no reason given'})", cure=CURE)
 
 
 def _blocks(found: dict[str, Any], names: Names, *, old: bool) -> list[Block]:

@@ -1,0 +1,111 @@
+"""Reading through meshio: cells, and the names each format has."""
+
+import meshio
+import numpy as np
+import pytest
+from tiny_meshes import CORNERS
+
+from ancf_petsc.errors import MeshError
+from ancf_petsc.mesh.read import read_mesh
+
+# meshio's writer of MED calls functions numpy is about to drop.
+pytestmark = pytest.mark.filterwarnings("ignore:.product. is deprecated:DeprecationWarning")
+
+TETS = np.array([(0, 1, 2, 3), (1, 2, 3, 4)])
+FACES = np.array([(0, 2, 1), (0, 1, 3)])
+
+
+def body(**options) -> meshio.Mesh:
+    return meshio.Mesh(np.array(CORNERS, dtype=float), [("triangle", FACES), ("tetra", TETS)], **options)
+
+
+@pytest.mark.parametrize("name", ["m.vtu", "m.vtk", "m.xdmf", "m.inp", "m.med", "m.bdf", "m.mesh", "m.ugrid"])
+def test_cells_and_points_come_through_every_format(tmp_path, name):
+    body().write(tmp_path / name)
+    mesh = read_mesh(tmp_path / name, ("tetra",))
+    assert np.allclose(mesh.points, CORNERS, atol=1e-15)
+    assert mesh.cells.tolist() == TETS.tolist()
+    assert mesh.node_numbers.tolist() == [1, 2, 3, 4, 5]
+    assert len(mesh.cell_numbers) == 2
+
+
+@pytest.mark.parametrize("name", ["m.vtu", "m.vtk", "m.xdmf"])
+def test_cell_sets_written_as_data_are_groups_again(tmp_path, name):
+    sets = {"wall": [[0, 1], []], "lower": [[], [0]], "upper": [[], [1]]}
+    mesh = body(cell_sets=sets)
+    if name == "m.xdmf":  # meshio would drop the sets
+        mesh.cell_sets_to_data()
+    mesh.write(tmp_path / name)
+    groups = read_mesh(tmp_path / name, ("tetra",)).groups
+    assert list(groups) == ["wall", "lower", "upper"]
+    assert np.sort(groups["wall"].parts[2]).tolist() == [[0, 1, 2], [0, 1, 3]]
+    assert groups["upper"].parts[3].tolist() == [[1, 2, 3, 4]]
+    assert groups["upper"].nodes.tolist() == [1, 2, 3, 4]
+
+
+def test_gmsh_tags_get_their_names_from_the_field_data(tmp_path):
+    path = tmp_path / "m.vtu"
+    body(cell_data={"gmsh:physical": [np.array([7, 8]), np.array([1, 0])]}).write(path, binary=False)
+    array = '<DataArray type="Int64" Name="{}" NumberOfComponents="2" format="ascii">{}</DataArray>'
+    names = array.format("wall", "7 2") + array.format("lower", "1 3")
+    path.write_text(
+        path.read_text().replace("<UnstructuredGrid>", f"<UnstructuredGrid><FieldData>{names}</FieldData>")
+    )
+    groups = read_mesh(path, ("tetra",)).groups
+    assert {name: list(group.parts) for name, group in groups.items()} == {
+        "wall": [2],
+        "physical_2_8": [2],
+        "lower": [3],
+    }
+
+
+def test_sets_of_abaqus_are_groups(tmp_path):
+    path = tmp_path / "m.inp"
+    path.write_text(
+        "*NODE\n10, 0, 0, 0\n20, 1, 0, 0\n30, 0, 1, 0\n40, 0, 0, 1\n50, 1, 1, 1\n"
+        "*ELEMENT, TYPE=C3D4, ELSET=body\n1, 10, 20, 30, 40\n2, 20, 30, 40, 50\n"
+        "*NSET, NSET=held\n10, 30\n*ELSET, ELSET=upper\n2\n"
+    )
+    groups = read_mesh(path, ("tetra",)).groups
+    assert groups["held"].nodes.tolist() == [0, 2]
+    assert groups["held"].parts == {}
+    assert groups["upper"].parts[3].tolist() == [[1, 2, 3, 4]]
+    assert len(groups["body"].parts[3]) == 2
+
+
+def test_families_of_med_are_groups(tmp_path):
+    mesh = body(cell_data={"cell_tags": [np.array([-6, -6]), np.array([-7, -8])]})
+    mesh.cell_tags = {-6: ["wall"], -7: ["body"], -8: ["body", "upper"]}
+    mesh.write(tmp_path / "m.med")
+    groups = read_mesh(tmp_path / "m.med", ("tetra",)).groups
+    assert {name: {d: len(parts) for d, parts in group.parts.items()} for name, group in groups.items()} == {
+        "wall": {2: 2},
+        "body": {3: 2},
+        "upper": {3: 1},
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("m.vtu", "<VTKFile", "meshio cannot read it"),
+        ("m.vtk", "# vtk DataFile Version 9.9\n", "meshio cannot read it"),
+        ("m.inp", "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n", "meshio cannot read it"),
+        ("m.bdf", "nothing\n", "meshio cannot read it"),
+        ("m.doc", "words", "not a format meshes are read from: found '.doc', expected one of .msh .vtu"),
+    ],
+)
+def test_files_meshio_cannot_read_are_errors_and_nothing_is_printed(tmp_path, capfd, name, text, message):
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(MeshError, match=message) as error:
+        read_mesh(path, ("tetra",))
+    assert "\n" not in str(error.value)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_plane_mesh_gets_a_third_coordinate(tmp_path):
+    square = meshio.Mesh(np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]), [("quad", [[0, 1, 2, 3]])])
+    square.write(tmp_path / "m.xdmf")
+    mesh = read_mesh(tmp_path / "m.xdmf", ("quad",), element="2412")
+    assert mesh.points.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
