@@ -78,9 +78,10 @@ def _read(case: Case) -> Blueprint:
 def _compile(case: Case, comm: MPI.Comm) -> None:
     """Compile the kernels on the root rank, so that the others load them."""
     laws = [law_named(name) for name in sorted({material.law for material in case.spec.material})]
-    if comm.rank == 0 and not is_compiled(laws):
+    mean = case.spec.dynamics is not None and case.spec.dynamics.integrator == "energy_momentum"
+    if comm.rank == 0 and not is_compiled(laws, mean=mean):
         log.info("compiling kernels (%s): once, under half a minute", ", ".join(law.name for law in laws))
-    on_root(comm, lambda: compile_kernels(laws))
+    on_root(comm, lambda: compile_kernels(laws, mean=mean))
 
 
 def _solve(

@@ -1,8 +1,8 @@
 """Solving with the mass matrix of the free degrees of freedom.
 
-One rank, small body: PETSc's Cholesky of the scalar mass, one factor per set of free nodes, all components at once. Else
-Chebyshev's iteration over the diagonal on fixed bounds (Golub and Varga 1961): no dot products, so every number of ranks gives
-the same numbers, and a fixed number of products.
+One rank: the inverse for very small bodies, else PETSc's Cholesky of the scalar mass; one of them per set of free nodes, all its
+components at once. Several ranks, or a large body: Chebyshev's iteration over the diagonal on fixed bounds (Golub and Varga
+1961): no dot products, so every number of ranks gives the same numbers.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 
 from ancf_petsc.system.mass import Mass
 
-LARGEST_TO_FACTOR = 20_000
+LARGEST_TO_INVERT, LARGEST_TO_FACTOR = 150, 20_000
 ACCURACY = 1e-13
 
 
@@ -48,7 +48,7 @@ class MassSolver:
         for factor in self._factors:
             factor.destroy()
 
-    def _factor(self) -> list[_Factor]:
+    def _factor(self) -> list[_Inverse] | list[_Factor]:
         pointers, columns = self.mass.assembly.graph
         n = len(self.free)
         matrix = csr_array((self.mass.values, columns, pointers), shape=(n, n))
@@ -56,7 +56,8 @@ class MassSolver:
         for axis in range(3):
             sets.setdefault(self.free[:, axis].tobytes(), []).append(axis)
         rows = {key: np.flatnonzero(np.frombuffer(key, bool)) for key in sets}
-        return [_Factor(matrix[rows[key]][:, rows[key]], rows[key], axes) for key, axes in sets.items()]
+        kind = _Inverse if n <= LARGEST_TO_INVERT else _Factor
+        return [kind(matrix[rows[key]][:, rows[key]], rows[key], axes, n) for key, axes in sets.items()]
 
     def _chebyshev(self, b: NDArray) -> NDArray:
         low, high = self.mass.bounds
@@ -76,10 +77,25 @@ class MassSolver:
         return result
 
 
+class _Inverse:
+    """The inverse of the mass of some nodes, zero elsewhere, and the components it serves."""
+
+    def __init__(self, matrix: csr_array, rows: NDArray, axes: list[int], total: int) -> None:
+        self.axes = slice(None) if len(axes) == 3 else axes
+        self._inverse = np.zeros((total, total))
+        self._inverse[np.ix_(rows, rows)] = np.linalg.inv(matrix.toarray())
+
+    def solve(self, b: NDArray, into: NDArray) -> None:
+        into[:, self.axes] = self._inverse @ b[:, self.axes]
+
+    def destroy(self) -> None:
+        """There is nothing of PETSc's."""
+
+
 class _Factor:
     """The factor of the mass of some nodes, and the components it serves."""
 
-    def __init__(self, matrix: csr_array, rows: NDArray, axes: list[int]) -> None:
+    def __init__(self, matrix: csr_array, rows: NDArray, axes: list[int], _: int) -> None:
         self.place = np.ix_(rows, axes)
         size, count = len(rows), len(axes)
         integers = PETSc.IntType

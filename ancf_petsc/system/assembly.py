@@ -62,7 +62,8 @@ class Assembly:
     def with_ghosts(self, field: NDArray, into: NDArray) -> NDArray:
         """A field (n, 3) on owned nodal vectors with its values at ghosts, in `into` (v, 3). Collective."""
         if self._ghosts is None:
-            return field
+            into[:] = field
+            return into
         self._ghosts[2].array[:] = field.ravel()
         return self.local(self._ghosts[2], into)
 
