@@ -21,7 +21,7 @@ the first law is the one of Olshevskiy et al. (2017), Eqs. (7)-(9), with the mis
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import log
+from math import log, log1p
 from typing import NamedTuple
 
 import numpy as np
@@ -46,7 +46,7 @@ from ancf_petsc.material.tensor import (
 )
 
 
-SAME_STRAIN = 1e-8  # below it the difference of two strains is rounding, and so is what it would correct
+SAME_STRAIN = 1e-6  # below it a correction of second order in the difference of strains is less than rounding
 
 
 class Law(NamedTuple):
@@ -140,11 +140,19 @@ def svk_mean_tangent(F0, F1, u, v, p):
 
 @register_jitable
 def neo_hooke_energy(F, p):
-    J = determinant(F)
-    if J <= 0.0:
+    if determinant(F) <= 0.0:
         return np.inf
-    log_J = log(J)
-    return 0.5 * p[1] * (contract(F, F) - 3.0) - p[1] * log_J + 0.5 * p[0] * log_J**2
+    E = green_lagrange(F)
+    log_J = log_det(E)
+    return p[1] * (trace(E) - log_J) + 0.5 * p[0] * log_J**2
+
+
+@register_jitable
+def log_det(E):
+    """ln J from the Green-Lagrange strain: small strains lose no digits, as the discrete gradient needs."""
+    linear = trace(E)
+    quadratic = 0.5 * (linear * linear - contract(E, E))
+    return 0.5 * log1p(2.0 * linear + 4.0 * quadratic + 8.0 * determinant(E))
 
 
 @register_jitable
@@ -175,7 +183,7 @@ def neo_hooke_second_stress(C, p):
 @register_jitable
 def neo_hooke_correction(F0, F1, S, p):
     """N = E1 - E0, N : N and the factor of N that makes S a discrete gradient; 0 where the states are the same."""
-    N = scale(0.5, add(gram(F1), scale(-1.0, gram(F0))))
+    N = add(green_lagrange(F1), scale(-1.0, green_lagrange(F0)))
     length = contract(N, N)
     if length < SAME_STRAIN**2:
         return N, length, 0.0

@@ -1,18 +1,25 @@
 """Linear solvers for the tangent, chosen by size; the options have the last word.
 
-Up to DIRECT_LIMIT degrees of freedom MUMPS factors the symmetric tangent (LDLᵀ: it may be indefinite, and its negative pivots
-are counted). Above, conjugate gradients with algebraic multigrid that knows the rigid motions of the current configuration.
-In motion the mass keeps the matrix definite: PETSc's own factorisation, which has less to set up, serves small bodies.
+Up to DIRECT_LIMIT degrees of freedom MUMPS factors the symmetric tangent (LDLᵀ: it may be indefinite, and its
+negative pivots are counted). Above, conjugate gradients: with incomplete factors up to MULTIGRID_LIMIT, then with
+algebraic multigrid that knows the rigid motions of the current configuration. The preconditioner is kept from one
+tangent to the next while it pays. In motion the mass keeps the matrix definite: PETSc's own factorisation, which has
+less to set up, serves small bodies.
 """
 
 from __future__ import annotations
 
+from math import log10
+
 from petsc4py import PETSc
 
+from ancf_petsc.solve.petsc import default_options, is_given
 from ancf_petsc.system.assembly import Assembly
 
-DIRECT_LIMIT = 25_000
+DIRECT_LIMIT = 3_000
+MULTIGRID_LIMIT = 120_000
 SMALL = 3_000
+TIRED = 1.5
 
 
 class LinearSolver:
@@ -27,6 +34,8 @@ class LinearSolver:
         self.symmetric = symmetric
         self.small = moving and assembly.comm.size == 1 and self.dof <= SMALL
         self.direct = self.dof <= DIRECT_LIMIT
+        self._fresh_rate: float | None = None
+        self._rate: float | None = None
         self._configure()
 
     def _configure(self) -> None:
@@ -37,20 +46,60 @@ class LinearSolver:
             pc.setFactorSolverType("petsc" if self.small else "mumps")
             if self.small:
                 pc.setFactorOrdering("qmd")
-        else:
-            self.ksp.setType(PETSc.KSP.Type.CG if self.symmetric else PETSc.KSP.Type.BCGS)
-            self.ksp.setTolerances(rtol=1e-8, max_it=500)
+            return
+        self.ksp.setType(PETSc.KSP.Type.CG if self.symmetric else PETSc.KSP.Type.BCGS)
+        self.ksp.setTolerances(rtol=1e-8, max_it=1000)
+        if self.symmetric:
+            self.ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
+        if self.dof > MULTIGRID_LIMIT or not self.symmetric:
             pc.setType(PETSc.PC.Type.GAMG)
             pc.setGAMGType("agg")
             pc.setGAMGSmooths(1)
-            pc.setReusePreconditioner(False)
+        elif self.assembly.comm.size == 1:
+            pc.setType(PETSc.PC.Type.ICC)
+        else:
+            pc.setType(PETSc.PC.Type.BJACOBI)
+
+    def read_options(self) -> None:
+        """Let the options speak, and see what they made of the solver."""
+        self.ksp.setFromOptions()
+        self.direct = self.ksp.getType() == PETSc.KSP.Type.PREONLY
 
     def fall_back_to_direct(self) -> None:
         """Factor from now on: for tangents that conjugate gradients cannot solve."""
         self.ksp.reset()
         self.direct = True
         self._configure()
+        self.ksp.getPC().setReusePreconditioner(False)
         self.ksp.setFromOptions()
+
+    def ask_for(self, reduction: float) -> None:
+        """How far an iterative solve has to reduce the residual, unless an option says so."""
+        if not self.direct and not is_given("ksp_rtol"):
+            self.ksp.setTolerances(rtol=reduction)
+
+    def renew_if_tired(self, matrix: PETSc.Mat, x: PETSc.Vec) -> None:
+        """Before a solve with a new tangent at x: keep the preconditioner if its last solve was about as quick as its
+        first.
+        """
+        if self.direct:
+            return
+        keep = self._fresh_rate is not None and self._rate is not None and self._rate <= TIRED * self._fresh_rate
+        self.ksp.getPC().setReusePreconditioner(keep)
+        if not keep:
+            self._fresh_rate = None
+            self.know_rigid_motions(matrix, x)
+            self.ksp.setOperators(matrix)
+            with default_options({"sub_pc_type": "icc"}):
+                self.ksp.setUp()
+
+    def note_effort(self, iterations: int, reduction: float) -> None:
+        """After a solve: iterations it took for a decade of residual."""
+        if self.direct or iterations == 0:
+            return
+        self._rate = iterations / max(-log10(reduction), 0.5)
+        if self._fresh_rate is None:
+            self._fresh_rate = self._rate
 
     def describe(self) -> str:
         """The solver in words, as it is after the options were read."""

@@ -12,10 +12,12 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ancf_petsc.solve.forcing import Forcing
 from ancf_petsc.solve.linear import LinearSolver
 from ancf_petsc.system.assembly import Assembly
 
 MOST_ITERATIONS = 25
+PREDICTOR_TERM = 1e-3
 Reason = PETSc.SNES.ConvergedReason
 WORDS = {
     Reason.DIVERGED_FNORM_NAN: "the start has det F <= 0 or forces that are not finite",
@@ -50,6 +52,9 @@ class Newton:
         self._snes = self._create()
         self.linear = LinearSolver(assembly, self._snes.getKSP())
         self._snes.setFromOptions()
+        self.linear.read_options()
+        self._forcing = Forcing(tolerance)
+        self._term = PREDICTOR_TERM
 
     def _create(self) -> PETSc.SNES:
         snes = PETSc.SNES().create(self.comm)
@@ -82,6 +87,7 @@ class Newton:
         """Bring x, whose driven degrees of freedom are those of s, to equilibrium. x is garbage if it fails."""
         self.set_pseudo_time(s)
         self._residuals = []
+        self._forcing.start()
         self._snes.solve(None, x)
         reason = self._snes.getConvergedReason()
         return Outcome(
@@ -104,12 +110,14 @@ class Newton:
         load = assembly.external_force(target) - assembly.external_force(s)
         rhs.array[:] = (load - assembly.tangent_product(x, increment)).ravel()
         rhs.array[assembly.driven] = 0.0
+        self._term = PREDICTOR_TERM
         self._tangent(self._snes, x, self.matrix, self.matrix)
         ksp = self.linear.ksp
         ksp.setOperators(self.matrix)
         step = assembly.vector()
         ksp.solve(rhs, step)
         good = ksp.getConvergedReason() > 0
+        self.linear.note_effort(ksp.getIterationNumber(), self._term)
         x.axpy(1.0, step)
         x.axpy(1.0, increment)
         assembly.set_driven(x, target)
@@ -135,16 +143,22 @@ class Newton:
 
     def _tangent(self, snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
         self.assembly.tangent(x, P)
-        self.linear.know_rigid_motions(P, x)
+        self.linear.renew_if_tired(P, x)
+        self.linear.ask_for(self._term)
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         residual = norms[2]
         if not np.isfinite(residual):
             return Reason.DIVERGED_FNORM_NAN
         scale = self._force_scale()
-        self._residuals.append(residual / scale if scale else 0.0)
-        if residual <= self.tolerance * scale or residual == 0.0:
+        relative = residual / scale if scale else 0.0
+        if iteration:
+            self.linear.note_effort(self.linear.ksp.getIterationNumber(), self._term)
+            self._forcing.learn(relative)
+        self._residuals.append(relative)
+        if relative <= self.tolerance:
             return Reason.CONVERGED_FNORM_RELATIVE
+        self._term = self._forcing.term(relative)
         return Reason.ITERATING
 
     def _force_scale(self) -> float:

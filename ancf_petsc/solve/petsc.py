@@ -42,6 +42,11 @@ def default_options(defaults: Mapping[str, object]) -> Iterator[None]:
             database.delValue(name)
 
 
+def is_given(name: str) -> bool:
+    """Whether the case or the command line says anything about an option."""
+    return PETSc.Options().hasName(name)
+
+
 def unused_options(given: Mapping[str, object]) -> list[str]:
     """Names of the options that no PETSc object has asked for so far."""
     return [name for name in given if not _used(name)]

@@ -33,7 +33,7 @@ class ImplicitFirstOrder(FirstOrder):
         self._eliminated = _Eliminated(self)
         self.jacobian = PETSc.Mat().createPython(self.y.getSizes(), self._eliminated, comm=equations.comm)
         self.jacobian.setUp()
-        self.test = ForceTest(equations)
+        self.test = ForceTest(equations, x)
         self.ts.setType(self.type_name)
         self.ts.setIFunction(self._function, self.y.duplicate())
         self.ts.setIJacobian(self._derivative, self.jacobian)

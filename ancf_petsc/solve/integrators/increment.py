@@ -19,8 +19,8 @@ from ancf_petsc.solve.petsc import default_options
 
 Reason = PETSc.SNES.ConvergedReason
 MOST_ITERATIONS = 25
-SLOW = 0.3  # a residual that falls by less asks for a new matrix: factoring costs some five iterations
-ROUNDING = 2e-15
+SLOW = 0.1  # a residual that falls by less asks for a new matrix: factoring costs some five iterations
+ROUNDING = 4e-16  # of a position: what it leaves of forces is this times stiffness and position
 WORDS = {
     Reason.DIVERGED_FNORM_NAN: "forces are not finite",
     Reason.DIVERGED_MAX_IT: f"no convergence in {MOST_ITERATIONS} Newton iterations",
@@ -41,8 +41,8 @@ class Forces:
 class ForceTest:
     """Convergence: out-of-balance force against the largest force at work. Tells whether the matrix has aged."""
 
-    def __init__(self, equations: Equations) -> None:
-        self.equations = equations
+    def __init__(self, equations: Equations, x: PETSc.Vec) -> None:
+        self.equations, self.x = equations, x
         self.scale = 0.0
         self.aged = True
         self._before = np.inf
@@ -55,9 +55,8 @@ class ForceTest:
         residual = norms[2]
         if not np.isfinite(residual):
             return Reason.DIVERGED_FNORM_NAN
-        assembly = self.equations.assembly
         forces = np.sqrt(self.equations.comm.allreduce(self.scale, MPI.SUM))
-        floor = ROUNDING * assembly.largest_diagonal * assembly.model.size
+        floor = ROUNDING * self.equations.assembly.largest_diagonal * self.x.norm()
         relative, absolute = snes.getTolerances()[:2]
         if iteration:
             self.aged = self.aged or residual > SLOW * self._before
@@ -88,7 +87,7 @@ class IncrementSolver:
         self.forces, self.tangent, self.relative = forces, tangent, relative
         self.matrix = self.assembly.create_matrix(symmetric=symmetric)
         self.d = self.assembly.vector()
-        self.test = ForceTest(equations)
+        self.test = ForceTest(equations, x)
         self.newton = self.linear_iterations = 0
         self._always_new = False
         self._residual = self.assembly.vector()
