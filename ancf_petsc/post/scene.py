@@ -97,4 +97,4 @@ def write_texts(plotter: pyvista.Plotter, title: str, line: str, note: str) -> N
         ("note", note, 18, 8, GREY),
     ):
         if text:
-            plotter.add_text(text, position=(26, height), font_size=size, color=colour, name=name)
+            plotter.add_text(text, position=(26, height), font_size=size, color=colour, name=name, render=False)

@@ -119,12 +119,14 @@ class Scene:
             clim=self.limits,
             show_scalar_bar=False,
             name="body",
+            render=False,
             **matt(body.n_cells),
         )
         if not self.plotter.scalar_bars:
             self._add_bar(title, actor)
         line = describe(self.results, self.look, step)
         write_texts(self.plotter, self.results.title, line, self.results.note)
+        self.plotter.render()
 
     def _add_bar(self, title: str, actor: pyvista.Actor) -> None:
         self.plotter.add_scalar_bar(
@@ -141,6 +143,7 @@ class Scene:
             title_font_size=20,
             label_font_size=19,
             unconstrained_font_size=True,
+            render=False,
         )
 
 

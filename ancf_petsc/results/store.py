@@ -47,13 +47,9 @@ class Table:
     slab: Slab
 
     def __post_init__(self) -> None:
-        if (
-            len(self.rows) != self.slab.stop - self.slab.start
-            or self.rows.shape[1:] != self.dataset.shape[1:]
-        ):
-            raise ValueError(
-                f"{self.dataset.path}: rows {self.rows.shape} for {self.slab} of {self.dataset.shape}"
-            )
+        expected = (self.slab.stop - self.slab.start, *self.dataset.shape[1:])
+        if self.rows.shape != expected:
+            raise ValueError(f"{self.dataset.path}: rows {self.rows.shape}, expected {expected}")
 
 
 class ResultStore:

@@ -27,15 +27,15 @@ CELL_KINDS = {  # by meshio's names
     "line": CellKind("Polyline", 3, 2),
     "line3": CellKind("Edge_3", 21, 3),
     "triangle": CellKind("Triangle", 5, 3),
-    "triangle6": CellKind("Tri_6", 22, 6),
+    "triangle6": CellKind("Triangle_6", 22, 6),
     "quad": CellKind("Quadrilateral", 9, 4),
-    "quad8": CellKind("Quad_8", 23, 8),
-    "quad9": CellKind("Quad_9", 28, 9),
+    "quad8": CellKind("Quadrilateral_8", 23, 8),
+    "quad9": CellKind("Quadrilateral_9", 28, 9),
     "tetra": CellKind("Tetrahedron", 10, 4),
-    "tetra10": CellKind("Tet_10", 24, 10),
+    "tetra10": CellKind("Tetrahedron_10", 24, 10),
     "hexahedron": CellKind("Hexahedron", 12, 8),
-    "hexahedron20": CellKind("Hex_20", 25, 20),
-    "hexahedron27": CellKind("Hex_27", 29, 27),
+    "hexahedron20": CellKind("Hexahedron_20", 25, 20),
+    "hexahedron27": CellKind("Hexahedron_27", 29, 27),
 }
 
 

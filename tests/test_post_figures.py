@@ -1,0 +1,154 @@
+"""What the figures show: the tables' numbers, words and units on the axes, notes below."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import results_writer as run
+from mpi4py import MPI
+
+from ancf_petsc.cli import main
+from ancf_petsc.post import figures
+from ancf_petsc.results.reader import open_results
+from ancf_petsc.results.tables import Table
+
+mpl.use("Agg")
+
+
+@pytest.fixture
+def block(tmp_path: Path):
+    run.write(tmp_path / "block", MPI.COMM_SELF)
+    return open_results(tmp_path / "block")
+
+
+@pytest.fixture
+def motion(tmp_path: Path):
+    """A body on a spring, without damping: energy is kept, the momentum swings."""
+    folder = tmp_path / "motion"
+    run.write(folder, MPI.COMM_SELF)
+    time = np.linspace(0, 6, 101)
+    columns = {
+        "time": time,
+        "kinetic_energy": np.sin(time) ** 2,
+        "strain_energy": np.cos(time) ** 2 + 1e-3 * time,
+        "external_work": 0 * time,
+        "momentum.x": np.sin(time),
+        "momentum.y": 0 * time,
+        "momentum.z": 0 * time,
+        **{f"angular_momentum.{axis}": 0 * time for axis in "xyz"},
+    }
+    _write(folder / "curve.csv", columns)
+    swing = np.cos(time)
+    moved = {"tip.x": 2 + swing, "tip.y": 0 * time, "tip.z": 0 * time}
+    _write(
+        folder / "probes.csv",
+        {"time": time, **moved, "tip.ux": swing, "tip.uy": 0 * time, "tip.uz": 0 * time},
+    )
+    return open_results(folder)
+
+
+@pytest.fixture(autouse=True)
+def _close_figures():
+    yield
+    mpl.pyplot.close("all")
+
+
+def _write(path, columns):
+    with Table(path, list(columns)) as table:
+        for row in zip(*columns.values(), strict=True):
+            table.append(row)
+
+
+def lines(axes):
+    """Points of the lines that stand for tables."""
+    return [line.get_xydata() for line in axes.lines if len(line.get_xdata()) > 2]
+
+
+def words(figure):
+    """What stands in the legend and below."""
+    legend = [text.get_text() for text in figure.legends[0].get_texts()] if figure.legends else []
+    return legend, figure.get_supxlabel()
+
+
+def test_compression_is_drawn_upwards_with_units_and_note(block):
+    figure = figures.force_stroke([block])
+    (axes,) = figure.axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("compression [mm]", "compressive force [N]")
+    np.testing.assert_array_equal(
+        lines(axes)[0], -np.column_stack([block.curve["stroke"], block.curve["force"]])
+    )
+    assert axes.get_title(loc="left") == run.TITLE
+    assert words(figure) == (["sum of internal forces"], run.NOTE)
+
+
+def test_runs_share_axes_and_are_named(block, tmp_path):
+    run.write(tmp_path / "other", MPI.COMM_SELF)
+    figure = figures.force_stroke([block, open_results(tmp_path / "other")])
+    assert len(lines(figure.axes[0])) == 2
+    assert words(figure)[0] == ["block", "other"]  # the titles are the same
+
+
+def test_pulling_is_drawn_as_stroke_and_force(block):
+    block.curve["force"] *= -1
+    (axes,) = figures.force_stroke([block]).axes
+    assert axes.get_ylabel() == "force [N]"
+    assert lines(axes)[0][-1].tolist() == [-0.1, 20.0]
+
+
+def test_a_statics_run_has_its_figures(block):
+    assert list(figures.figures_of([block])) == ["force_stroke", "energy", "probes", "steps"]
+
+
+def test_a_motion_has_its_figures(motion):
+    made = figures.figures_of([motion])
+    assert list(made) == ["energy", "probes", "momentum"]
+    assert made["momentum"].axes[-1].get_xlabel() == "time"
+
+
+def test_the_drift_is_what_the_balance_gains(motion):
+    """Kinetic + strain grow by 0.001 t of the largest part, 1.0051 at most."""
+    drift = figures.energy_drift(motion.curve)
+    largest = motion.curve["strain_energy"].max()
+    np.testing.assert_allclose(drift, 1e-3 * motion.curve["time"] / largest, atol=1e-15)
+
+
+def test_probes_are_drawn_where_they_move(motion, block):
+    (axes,) = figures.probes([motion]).axes
+    assert axes.get_ylabel() == "x position [mm]"
+    np.testing.assert_array_equal(lines(axes)[0][:, 1], motion.probes["tip.x"])
+    (axes,) = figures.probes([block]).axes
+    assert axes.get_ylabel() == "z displacement [mm]"
+
+
+def test_no_figure_without_columns(motion):
+    assert figures.force_stroke([motion]) is None
+    assert figures.steps([motion]) is None
+
+
+def test_plot_writes_the_pictures(block, tmp_path, capsys):
+    assert main(["plot", str(block.folder), "--out", str(tmp_path / "pictures")]) == 0
+    said = capsys.readouterr().out.split()
+    assert sorted(map(Path, said)) == sorted((tmp_path / "pictures").iterdir())
+    assert all(Path(name).read_bytes().startswith(b"\x89PNG") for name in said)
+
+
+@pytest.mark.parametrize(("suffix", "start"), [("pdf", b"%PDF"), ("svg", b"<?xml")])
+def test_pictures_may_be_drawn_as_lines(suffix, start, block, tmp_path):
+    (path,) = figures.save({"force": figures.force_stroke([block])}, tmp_path, suffix)
+    assert path.read_bytes().startswith(start)
+
+
+def test_plot_tells_what_is_no_run(tmp_path, capsys):
+    assert main(["plot", str(tmp_path)]) == 2
+    assert "no results here" in capsys.readouterr().err
+
+
+def test_the_script_compares_runs(block, mpirun, project, tmp_path):
+    script = project / "scripts" / "compare_runs.py"
+    said = mpirun(1, [script, block.folder, block.folder, "--out", tmp_path / "both.png"]).stdout
+    # force 200 times the stroke of 0.1: 20 at most, half of 20 times 0.1 put in and kept
+    assert said.count("-20                 1                 1               200               200") == 2
+    assert (tmp_path / "both.png").read_bytes().startswith(b"\x89PNG")
