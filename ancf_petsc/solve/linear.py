@@ -84,7 +84,9 @@ class LinearSolver:
         """
         if self.direct:
             return
-        keep = self._fresh_rate is not None and self._rate is not None and self._rate <= TIRED * self._fresh_rate
+        keep = (
+            self._fresh_rate is not None and self._rate is not None and self._rate <= TIRED * self._fresh_rate
+        )
         self.ksp.getPC().setReusePreconditioner(keep)
         if not keep:
             self._fresh_rate = None
