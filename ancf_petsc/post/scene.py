@@ -11,6 +11,7 @@ import numpy as np
 import pyvista
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonCore import vtkLogger
+from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
 from ancf_petsc.errors import EnvironmentProblem
 from ancf_petsc.post.panels import GREY
@@ -46,7 +47,11 @@ def has_display() -> bool:
 
 def surface(grid: pyvista.UnstructuredGrid) -> pyvista.PolyData:
     """The outside, with its fields; curved cells are drawn curved."""
-    return grid.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=3)
+    skin = vtkDataSetSurfaceFilter()  # pyvista's own way to it changes between versions
+    skin.SetInputData(grid)
+    skin.SetNonlinearSubdivisionLevel(3)
+    skin.Update()
+    return pyvista.wrap(skin.GetOutput())
 
 
 def matt(cells: int) -> dict[str, Any]:
@@ -97,4 +102,5 @@ def write_texts(plotter: pyvista.Plotter, title: str, line: str, note: str) -> N
         ("note", note, 18, 8, GREY),
     ):
         if text:
-            plotter.add_text(text, position=(26, height), font_size=size, color=colour, name=name, render=False)
+            place = (26, height)
+            plotter.add_text(text, position=place, font_size=size, color=colour, name=name, render=False)

@@ -92,6 +92,7 @@ class Scene:
         """steps: those the colours and the frame have to hold for."""
         self.results = results
         self.look = look
+        self.title = label(results, look)
         self.limits, self.clipped = _limits([scalars(results, look, step) for step in steps])
         self.colours = "RdBu_r" if self.limits[0] < 0 < self.limits[1] else "viridis"
         self.plotter = make_plotter(off_screen=off_screen, smooth=smooth)
@@ -110,11 +111,10 @@ class Scene:
         """The body, the time and the stroke at a step counted from 0."""
         body = self.results.mesh(step, scale=self.look.scale, fields=())
         data = body.point_data if self.look.field in self.results.node_fields else body.cell_data
-        title = label(self.results, self.look)
-        data[title] = scalars(self.results, self.look, step)
+        data[self.title] = scalars(self.results, self.look, step)
         actor = self.plotter.add_mesh(
             surface(body),
-            scalars=title,
+            scalars=self.title,
             cmap=self.colours,
             clim=self.limits,
             show_scalar_bar=False,
@@ -123,14 +123,14 @@ class Scene:
             **matt(body.n_cells),
         )
         if not self.plotter.scalar_bars:
-            self._add_bar(title, actor)
+            self._add_bar(actor)
         line = describe(self.results, self.look, step)
         write_texts(self.plotter, self.results.title, line, self.results.note)
         self.plotter.render()
 
-    def _add_bar(self, title: str, actor: pyvista.Actor) -> None:
+    def _add_bar(self, actor: pyvista.Actor) -> None:
         self.plotter.add_scalar_bar(
-            title=f"{title}\n{self.clipped}\n",
+            title=f"{self.title}\n{self.clipped}\n",
             mapper=actor.mapper,
             vertical=True,
             position_x=0.86,
