@@ -56,9 +56,13 @@ class Blueprint:
 def draw(case: Case) -> Blueprint:
     """Read the mesh and enter everything the case says into tables. Raises CaseError."""
     spec = case.spec
-    row = element(spec.mesh.element)
-    mesh = read_mesh(case.mesh_file, row.kinds, duplicates=spec.mesh.duplicates, element=row.code)
-    return draw_on(case, mesh)
+    try:
+        row = element(spec.mesh.element)
+        mesh = read_mesh(case.mesh_file, row.kinds, duplicates=spec.mesh.duplicates, element=row.code)
+        return draw_on(case, mesh)
+    except CaseError as error:
+        error.file = error.file or case.file
+        raise
 
 
 def draw_on(case: Case, mesh: Mesh) -> Blueprint:

@@ -24,7 +24,7 @@ from ancf_petsc.log import log_file
 from ancf_petsc.material import law_named
 from ancf_petsc.parallel.exchange import agree, on_root
 from ancf_petsc.results.folder import check_folder, claim_folder, write_summary
-from ancf_petsc.solve.petsc import petsc_options, refuse_unused
+from ancf_petsc.solve.petsc import petsc_options, refuse_unused, refuse_wrong_values
 
 log = logging.getLogger("ancf")
 
@@ -50,14 +50,14 @@ def run_case(
     with petsc_options(case.spec.petsc):
         with clock.part("read"):
             blueprint = on_root(comm, lambda: _read(case))
-        with clock.part("setup"):
+        with clock.part("setup"), refuse_wrong_values(case.spec.petsc):
             _compile(case, comm)
             built = build_from(case, blueprint, comm)
             del blueprint
             solver = Motion(case, built) if case.spec.dynamics else Statics(case, built)
         try:
             if case.spec.petsc:
-                with clock.part("setup"):
+                with clock.part("setup"), refuse_wrong_values(case.spec.petsc):
                     solver.prepare()
                     agree(comm, lambda: refuse_unused(case.spec.petsc))
             on_root(comm, lambda: claim_folder(folder))

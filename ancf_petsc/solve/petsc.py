@@ -1,7 +1,7 @@
 """PETSc's options: the one place that reads and writes them.
 
-The options of a case and of the command line have the last word: solvers set their defaults first and call `setFromOptions`
-after. An option that no solver asked for is an error.
+The options of a case and of the command line have the last word: solvers set their defaults first and call
+`setFromOptions` after. An option that no solver asked for is an error.
 """
 
 from __future__ import annotations
@@ -40,6 +40,21 @@ def default_options(defaults: Mapping[str, object]) -> Iterator[None]:
     finally:
         for name in added:
             database.delValue(name)
+
+
+@contextmanager
+def refuse_wrong_values(given: Mapping[str, object]) -> Iterator[None]:
+    """Raise CaseError for options whose values PETSc does not take. Around the making of solvers."""
+    try:
+        yield
+    except PETSc.Error as error:
+        if not given:
+            raise
+        said = str(error).splitlines()[-1].split("] ", 1)[-1]
+        names = ", ".join(given)
+        raise CaseError(
+            f"PETSc refuses an option: {said}", key="petsc", got=names, cure="correct or drop it"
+        ) from error
 
 
 def is_given(name: str) -> bool:

@@ -1,8 +1,8 @@
 """Work of driven degrees of freedom and of dead loads along the path.
 
-All of it hangs on a few scalars: each motion has the sum of reactions on its degrees of freedom, each load the displacement
-its pattern sees. W = sum_m ∫ R_m dq_m + sum_l ∫ p_l dD_l, where q_m(s) and p_l(s) are the ramps, known exactly, and R_m, D_l
-follow the polynomial through the last accepted states.
+All of it hangs on a few scalars: each motion has the sum of reactions on its degrees of freedom, each load the
+displacement its pattern sees. W = sum_m ∫ R_m dq_m + sum_l ∫ p_l dD_l, where q_m(s) and p_l(s) are the ramps, known
+exactly, and R_m, D_l follow the polynomial through the last accepted states.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class PathWork:
         self._states = [(s, reactions, displacements)]
 
     def add(self, s: float, reactions: NDArray, displacements: NDArray) -> None:
-        """Go on to the state at s. While few states are known, the whole piece is integrated again with all of them."""
+        """Go on to the state at s. While few states are known, all of the piece is integrated again with them."""
         self._states.append((s, reactions, displacements))
         if len(self._states) > POINTS:
             del self._states[0]
@@ -50,6 +50,8 @@ class PathWork:
 
     def _increment(self, k: int) -> float:
         """Work between states k - 1 and k."""
+        if len(self._states) == 2:
+            return self._trapezoid()
         times = np.array([state[0] for state in self._states])
         middle, half = (times[k] + times[k - 1]) / 2, (times[k] - times[k - 1]) / 2
         work = 0.0
@@ -64,6 +66,13 @@ class PathWork:
             ends = [load.ramp.value(times[j]) * self._states[j][2][number] for j in (k - 1, k)]
             work += ends[1] - ends[0]
         return float(work)
+
+    def _trapezoid(self) -> float:
+        """Work between the first two states: force against displacement is a straight line, whatever the ramp."""
+        (s0, reactions_0, seen_0), (s1, reactions_1, seen_1) = self._states
+        moved = [motion.value(s1) - motion.value(s0) for motion in self.motions]
+        factors = [0.5 * (load.ramp.value(s0) + load.ramp.value(s1)) for load in self.loads]
+        return float(np.dot(0.5 * (reactions_0 + reactions_1), moved) + np.dot(factors, seen_1 - seen_0))
 
 
 def _lagrange(nodes: NDArray, t: float) -> NDArray:
