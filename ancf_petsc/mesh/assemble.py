@@ -27,16 +27,29 @@ ASK_FOR = {
 
 
 class Numbering:
-    """Where the nodes of the file stand in the points of the mesh."""
+    """Where the nodes of a file stand in the points of the mesh."""
 
-    def __init__(self, numbers: Integers) -> None:
+    def __init__(self, numbers: Integers, path: Path) -> None:
         self.numbers = numbers
         self.rows = np.arange(len(numbers))
+        self.path = path
 
-    def of(self, numbers: Integers) -> Integers:
+    def find(self, numbers: Integers) -> Integers:
         """Indices of points, same shape as `numbers`; -1 where the file has no such node."""
         place = np.minimum(np.searchsorted(self.numbers, numbers), len(self.numbers) - 1)
         return np.where(self.numbers[place] == numbers, self.rows[place], -1)
+
+    def of(self, block: Block) -> Integers:
+        """Indices (m, k) of points of a block's cells. Raises MeshError where the file lacks one."""
+        nodes = self.find(block.nodes)
+        if nodes.size and nodes.min() < 0:
+            row, column = np.argwhere(nodes < 0)[0]
+            raise mesh_error(self.path)(
+                f"{block.kind} {block.numbers[row]} refers to node {block.nodes[row, column]}, "
+                "which the file does not hold",
+                cure="write the mesh again with all its nodes",
+            )
+        return nodes
 
 
 def assemble(raw: RawMesh, path: Path, kinds: tuple[str, ...], duplicates: str, element: str) -> Mesh:
@@ -47,12 +60,14 @@ def assemble(raw: RawMesh, path: Path, kinds: tuple[str, ...], duplicates: str, 
     numbers, points = _sorted_nodes(raw, path)
     bodies, others = _body_blocks(raw.blocks, kinds, element, path)
     kind = KINDS[bodies[0].kind]
-    numbering = Numbering(numbers)
-    cell_numbers, cells, membership = _cells(bodies, numbering, path)
-    mesh = Mesh(points, kind.name, cells, {}, numbers, cell_numbers, _used(points, cells), source=str(path))
-    _settle_duplicates(mesh, numbering, duplicates, path)
+    numbering = Numbering(numbers, path)
+    cell_numbers, cells, membership = _cells(bodies, numbering)
+    used = np.zeros(len(points), dtype=bool)
+    used[cells] = True
+    mesh = Mesh(points, kind.name, cells, {}, numbers, cell_numbers, used, source=str(path))
+    _settle_duplicates(mesh, numbering, duplicates)
     _orient(mesh, kind, path)
-    _build_groups(mesh, kind, raw, others, membership, numbering, path)
+    _build_groups(mesh, raw, others, membership, numbering)
     unused = len(mesh.points) - np.count_nonzero(mesh.used)
     if unused:
         mesh.notes.append(f"{unused} of {len(mesh.points)} nodes belong to no element: kept, in no group")
@@ -69,7 +84,8 @@ def _sorted_nodes(raw: RawMesh, path: Path) -> tuple[Integers, Floats]:
     if len(bad):
         place = _place(points[bad[0]])
         raise wrong(
-            f"{len(bad)} nodes have coordinates that are not finite, first node {numbers[bad[0]]} at {place}"
+            f"{len(bad)} nodes have coordinates that are not finite, first node {numbers[bad[0]]} at {place}",
+            cure="mend the mesh",
         )
     return numbers, points
 
@@ -119,25 +135,10 @@ def _wrong_cells(
     return wrong(f"found only {found}, expected {expected}", cure=cure)
 
 
-def _indices(block: Block, numbering: Numbering, path: Path) -> Integers:
-    nodes = numbering.of(block.nodes)
-    bad = np.argwhere(nodes < 0)
-    if len(bad):
-        row, column = bad[0]
-        node = block.nodes[row, column]
-        raise mesh_error(path)(
-            f"{block.kind} {block.numbers[row]} refers to node {node}, which the file does not hold",
-            cure="write the mesh again with all its nodes",
-        )
-    return nodes
-
-
-def _cells(
-    blocks: list[Block], numbering: Numbering, path: Path
-) -> tuple[Integers, Integers, dict[str, Integers]]:
+def _cells(blocks: list[Block], numbering: Numbering) -> tuple[Integers, Integers, dict[str, Integers]]:
     """Numbers (e,) ascending, cells (e, k), group name -> its cells; a cell listed twice is one cell."""
     numbers = np.concatenate([block.numbers for block in blocks])
-    nodes = np.concatenate([_indices(block, numbering, path) for block in blocks])
+    nodes = np.concatenate([numbering.of(block) for block in blocks])
     order = np.argsort(numbers, kind="stable")
     _, first, same = np.unique(
         row_keys(nodes[order], len(numbering.numbers)), return_index=True, return_inverse=True
@@ -156,36 +157,31 @@ def _cells(
     return numbers[order][kept], nodes[order][kept], membership
 
 
-def _used(points: Floats, cells: Integers) -> np.ndarray:
-    used = np.zeros(len(points), dtype=bool)
-    used[cells] = True
-    return used
-
-
-def _settle_duplicates(mesh: Mesh, numbering: Numbering, duplicates: str, path: Path) -> None:
+def _settle_duplicates(mesh: Mesh, numbering: Numbering, duplicates: str) -> None:
     """Coincident nodes in use: refuse, keep or merge them."""
     nodes = np.flatnonzero(mesh.used)
     pairs = nodes[coincident_pairs(mesh.points[nodes], TOLERANCE * mesh.size)]
     if not len(pairs):
         return
+    pairs = pairs[np.lexsort(pairs.T[::-1])]
     doubled = len(np.unique(pairs[:, 1]))
     if duplicates == "keep":
         mesh.notes.append(f"{doubled} nodes lie on others: kept apart")
     elif duplicates == "merge":
-        _merge(mesh, numbering, pairs, path)
+        _merge(mesh, numbering, pairs)
         mesh.notes.append(f"{doubled} nodes lay on others: merged")
     else:
         first, second = pairs[0]
         one, other = mesh.node_numbers[first], mesh.node_numbers[second]
-        raise mesh_error(path)(
+        raise mesh_error(numbering.path)(
             f"{doubled} nodes lie on others, first nodes {one} and {other} at {_place(mesh.points[first])}",
             cure='set mesh.duplicates = "merge" to join them or "keep" for a crack or separate bodies',
         )
 
 
-def _merge(mesh: Mesh, numbering: Numbering, pairs: Integers, path: Path) -> None:
+def _merge(mesh: Mesh, numbering: Numbering, pairs: Integers) -> None:
     """Nodes that coincide become the one with the lowest number, which keeps it."""
-    wrong = mesh_error(path)
+    wrong = mesh_error(numbering.path)
     target = representatives(pairs, len(mesh.points))
     kept = target == np.arange(len(target))
     index = (np.cumsum(kept) - 1)[target]
@@ -233,23 +229,18 @@ def _orient(mesh: Mesh, kind: Kind, path: Path) -> None:
 
 
 def _build_groups(
-    mesh: Mesh,
-    kind: Kind,
-    raw: RawMesh,
-    blocks: list[Block],
-    membership: dict[str, Integers],
-    numbering: Numbering,
-    path: Path,
+    mesh: Mesh, raw: RawMesh, blocks: list[Block], membership: dict[str, Integers], numbering: Numbering
 ) -> None:
     """Groups of the parts and cells that have the name; parts with nodes no cell uses are left out."""
+    kind = KINDS[mesh.kind]
     rows: dict[str, list[Integers]] = {name: [] for name in raw.names}
     parts: dict[str, dict[int, list[Integers]]] = {name: {} for name in raw.names}
     for block in blocks:
         if not block.names:
             continue
-        nodes = _indices(block, numbering, path)
+        nodes = numbering.of(block)
         nodes = nodes[mesh.used[nodes].all(axis=1)]
-        corners = _corners_of_parts(nodes, block.kind, kind, path)
+        corners = _corners_of_parts(nodes, block.kind, kind, numbering.path)
         for name in block.names:
             rows[name].append(nodes.ravel())
             parts[name].setdefault(KINDS[block.kind].dimension, []).append(corners)
@@ -257,7 +248,7 @@ def _build_groups(
         rows[name].append(mesh.cells[cells].ravel())
         parts[name][kind.dimension] = [mesh.cells[cells, : kind.corners]]
     for name, numbers in raw.node_sets.items():
-        nodes = numbering.of(numbers)
+        nodes = numbering.find(numbers)
         rows[name].append(nodes[(nodes >= 0) & mesh.used[nodes]])
     bound = len(mesh.points)
     for name in raw.names:
@@ -270,11 +261,10 @@ def _corners_of_parts(nodes: Integers, name: str, kind: Kind, path: Path) -> Int
     """Corners (m, c) of parts (m, k), which must be such as cells of `kind` have."""
     part = KINDS[name]
     corners = nodes[:, : part.corners]
-    fits = {len(kind.sides[0]), 2, 1} if part.dimension == kind.dimension - 1 else {1, 2}
-    if len(nodes) and part.corners not in fits:
-        side = part_kind(kind.dimension - 1, len(kind.sides[0])).name
+    side = part_kind(kind.dimension - 1, len(kind.sides[0]))
+    if len(nodes) and part.dimension == side.dimension and part.corners != side.corners:
         raise mesh_error(path)(
-            f"found {len(nodes)} {name} parts in groups, expected {side} parts on {kind.name} cells",
+            f"found {len(nodes)} {name} parts in groups, expected {side.name} parts on {kind.name} cells",
             cure="mesh surfaces and body together",
         )
     return corners

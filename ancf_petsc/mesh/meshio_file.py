@@ -27,10 +27,11 @@ ALL = ".msh .vtu .vtk .xdmf .inp .med .bdf .mesh"
 def read_meshio(path: Path) -> RawMesh:
     """The mesh in a file of any format meshio reads."""
     mesh = _read(path)
-    points = np.zeros((len(mesh.points), 3))
-    points[:, : mesh.points.shape[1]] = mesh.points[:, :3]
+    given = mesh.points.reshape(len(mesh.points), -1)
+    points = np.zeros((len(given), 3))
+    points[:, : given.shape[1]] = given
     numbers = np.arange(1, len(points) + 1)
-    cells = [np.asarray(block.data) for block in mesh.cells]
+    cells = [_nodes(block) for block in mesh.cells]
     kinds = [SAME.get(block.type, block.type) for block in mesh.cells]
     first = np.cumsum([1, *map(len, cells)])
     blocks = [
@@ -73,6 +74,12 @@ def _read(path: Path) -> Any:
     raise wrong(
         f"meshio cannot read it ({reason})", cure="the file may be truncated or damaged: write it again"
     )
+
+
+def _nodes(block: Any) -> np.ndarray:
+    """Rows (m, k) of points; none where cells have different numbers of nodes, as polyhedra do."""
+    ragged = block.type.startswith("polyhedron")
+    return np.empty((len(block.data), 0)) if ragged else np.asarray(block.data)
 
 
 def _cell_sets(mesh: Any, kinds: list[str]) -> Iterator[tuple[str, int, Integers]]:
