@@ -33,7 +33,8 @@ class LinearSolver:
         self.dof = assembly.model.dof
         self.symmetric = symmetric
         self.small = moving and assembly.comm.size == 1 and self.dof <= SMALL
-        self.direct = self.dof <= DIRECT_LIMIT
+        chosen = is_given("ksp_type") or is_given("pc_type")
+        self.direct = self.dof <= DIRECT_LIMIT and not chosen
         self._fresh_rate: float | None = None
         self._rate: float | None = None
         self._configure()
@@ -140,8 +141,8 @@ def negative_pivots_of(matrix: PETSc.Mat) -> int | None:
     pc.setFactorSolverType("mumps")
     try:
         pc.setUp()
-        failed = pc.getFailedReason() != 0
-        return None if failed else int(pc.getFactorMatrix().getMumpsInfog(12))
+        factor = pc.getFactorMatrix()
+        return int(factor.getMumpsInfog(12)) if factor.getMumpsInfog(1) >= 0 else None
     except PETSc.Error:
         return None
     finally:
