@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from ancf_petsc.solve.equations import Equations
 from ancf_petsc.solve.integrators.base import SHORTEST, Integrator, Settings, Step
 
+NOT_FINITE = 72  # PETSC_ERR_FP
 SPEED_CHANGE = 1.1  # a largest speed grown by this factor widens the tolerance of velocities
 
 
@@ -55,7 +56,9 @@ class FirstOrder(Integrator):
         try:
             self.ts.step()
         except PETSc.Error as error:
-            raise self.failed(goal, f"the solver stopped ({_first_line(error)})") from error
+            if error.ierr != NOT_FINITE:
+                raise
+            raise self.failed(goal, "numbers are not finite any more") from error
         if self.ts.getConvergedReason() < 0:
             raise self.failed(goal, "Newton does not converge or no step is short enough")
         before, now = self.time, self.ts.getTime()
@@ -113,8 +116,3 @@ class FirstOrder(Integrator):
         newton, linear, rejected = np.subtract(counts, self._counts)
         self._counts = counts
         return Step(self.time, size, int(newton), int(linear), int(rejected))
-
-
-def _first_line(error: Exception) -> str:
-    lines = [line for line in str(error).splitlines() if line.strip()]
-    return lines[-1].strip() if lines else type(error).__name__

@@ -31,7 +31,7 @@ class ImplicitFirstOrder(FirstOrder):
         super().__init__(equations, settings, x, v)
         self.matrix = equations.assembly.create_matrix()
         self._eliminated = _Eliminated(self)
-        self.jacobian = PETSc.Mat().createPython(self.y.getSizes(), self._eliminated, comm=equations.comm)
+        self.jacobian = PETSc.Mat().createPython((self.y.getSizes(),) * 2, self._eliminated, comm=equations.comm)
         self.jacobian.setUp()
         self.test = ForceTest(equations, x)
         self.ts.setType(self.type_name)

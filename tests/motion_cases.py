@@ -1,0 +1,66 @@
+"""Bodies in motion for the tests: cases as tables, and runs without files."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from ancf_petsc import case_from_dict
+from ancf_petsc.case.build import build
+from ancf_petsc.case.motion import Motion
+from ancf_petsc.solve.dynamics import TimeIntegration
+
+PROJECT = Path(__file__).resolve().parent.parent
+REFERENCE = Path(__file__).parent / "reference"
+GRAVITY = {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}
+HINGE = {"group": "hinge", "fix": ["x", "y", "z"]}
+
+
+def body(mesh: str, dynamics: dict[str, Any], **tables: Any) -> dict[str, Any]:
+    """A case of a mesh of the project; the pendulum's material unless `material` changes it."""
+    material = {"law": "svk", "young": 2e6, "poisson": 0.3, "density": 7800.0, **tables.pop("material", {})}
+    return {
+        "title": "Body in motion",
+        "mesh": {"file": str(PROJECT / "meshes" / mesh), "element": "3413"},
+        "material": material,
+        "dynamics": dynamics,
+        **deepcopy(tables),
+    }
+
+
+def pendulum(dynamics: dict[str, Any], **tables: Any) -> dict[str, Any]:
+    """96 tetrahedra, hinged at an edge, falling from the horizontal."""
+    return body("pendulum_96.msh", dynamics, **{"constraint": [HINGE], "load": [GRAVITY], **tables})
+
+
+class Followed:
+    """A motion that was followed to its end. rows: what `look(motion)` returned at the start and after each step."""
+
+    def __init__(self, data: dict[str, Any], look=None, comm: MPI.Comm = MPI.COMM_SELF) -> None:
+        case = case_from_dict(data, PROJECT)
+        self.motion = Motion(case, build(case, comm))
+        self.steps: list = []
+        self.rows = [look(self.motion)] if look else []
+
+        def on_step(step) -> None:
+            self.steps.append(step)
+            if look:
+                self.rows.append(look(self.motion))
+
+        path = TimeIntegration(self.motion.integrator, self.motion.times, on_step, lambda time, jumps: None)
+        try:
+            path.run()
+            self.positions = self.motion.integrator.x.array_r.reshape(-1, 3).copy()
+            self.velocities = self.motion.integrator.v.array_r.reshape(-1, 3).copy()
+        finally:
+            path.destroy()
+            self.motion.destroy()
+
+
+def slope(sizes, errors) -> float:
+    """Order of convergence by least squares in logarithms."""
+    return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
