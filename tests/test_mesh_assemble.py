@@ -36,7 +36,7 @@ def cells_of_kind(kind: str) -> Block:
         (["tetra", "tetra10"], "mixed cells: found 1 tetra, 1 tetra10"),
         (["triangle", "vertex"], "found only 1 triangle, 1 vertex, expected tetra .*; mesh the body in 3D"),
         (["wedge"], "found 1 wedge, expected tetra cells for element 3413; mesh with tetra cells"),
-        ([], "found only no cells, expected tetra cells"),
+        ([], "found no cells, expected tetra cells"),
     ],
 )
 def test_cells_the_element_cannot_use_are_named_with_the_cure(kinds, message):

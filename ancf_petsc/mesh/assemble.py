@@ -99,6 +99,7 @@ def _body_blocks(
 ) -> tuple[list[Block], list[Block]]:
     """Blocks of the body's cells, which must all be of one kind in `kinds`, and the blocks of parts."""
     dimension = KINDS[kinds[0]].dimension
+    blocks = [block for block in blocks if len(block.numbers)]
     unknown = [block for block in blocks if block.kind not in KINDS]
     known = [block for block in blocks if block.kind in KINDS]
     counts: dict[str, int] = {}
@@ -129,10 +130,11 @@ def _wrong_cells(
     lower: dict[str, int] = {}
     for block in blocks:
         lower[block.kind] = lower.get(block.kind, 0) + len(block.numbers)
-    found = ", ".join(f"{count} {kind}" for kind, count in sorted(lower.items())) or "no cells"
+    listing = ", ".join(f"{count} {kind}" for kind, count in sorted(lower.items()))
+    found = f"only {listing}" if listing else "no cells"
     dimension = KINDS[kinds[0]].dimension
     cure = f"mesh the body in {dimension}D (gmsh -{dimension}) and save its cells"
-    return wrong(f"found only {found}, expected {expected}", cure=cure)
+    return wrong(f"found {found}, expected {expected}", cure=cure)
 
 
 def _cells(blocks: list[Block], numbering: Numbering) -> tuple[Integers, Integers, dict[str, Integers]]:

@@ -27,12 +27,12 @@ ALL = ".msh .vtu .vtk .xdmf .inp .med .bdf .mesh"
 def read_meshio(path: Path) -> RawMesh:
     """The mesh in a file of any format meshio reads."""
     mesh = _read(path)
-    given = mesh.points.reshape(len(mesh.points), -1)
-    points = np.zeros((len(given), 3))
-    points[:, : given.shape[1]] = given
+    points = np.zeros((len(mesh.points), 3))
+    if len(points):
+        points[:, : mesh.points.shape[1]] = mesh.points
     numbers = np.arange(1, len(points) + 1)
-    cells = [_nodes(block) for block in mesh.cells]
     kinds = [SAME.get(block.type, block.type) for block in mesh.cells]
+    cells = [_nodes(block, kind) for block, kind in zip(mesh.cells, kinds, strict=True)]
     first = np.cumsum([1, *map(len, cells)])
     blocks = [
         Block(kind, np.arange(start, start + len(nodes)), nodes.astype(np.int64) + 1)
@@ -76,10 +76,11 @@ def _read(path: Path) -> Any:
     )
 
 
-def _nodes(block: Any) -> np.ndarray:
-    """Rows (m, k) of points; none where cells have different numbers of nodes, as polyhedra do."""
-    ragged = block.type.startswith("polyhedron")
-    return np.empty((len(block.data), 0)) if ragged else np.asarray(block.data)
+def _nodes(block: Any, kind: str) -> np.ndarray:
+    """Rows (m, k) of points; k is 0 for polyhedra, whose cells have different numbers of nodes."""
+    if not len(block.data) or kind.startswith("polyhedron"):
+        return np.empty((len(block.data), KINDS[kind].nodes if kind in KINDS else 0))
+    return np.asarray(block.data)
 
 
 def _cell_sets(mesh: Any, kinds: list[str]) -> Iterator[tuple[str, int, Integers]]:
