@@ -90,7 +90,12 @@ def _unstructured(body: Body, size: float) -> tuple[Floats, Integers]:
     with gmsh_session(**options) as gmsh:
         body.build(gmsh)
         gmsh.model.occ.synchronize()
-        gmsh.model.mesh.generate(3)
+        try:
+            gmsh.model.mesh.generate(3)
+        except Exception as error:
+            raise CaseError(
+                f"Gmsh cannot mesh the body ({error})", key="--size", got=size, cure=f"try {body.size:g}"
+            ) from None
         numbers, coordinates, _ = gmsh.model.mesh.getNodes()
         _, nodes = gmsh.model.mesh.getElementsByType(KINDS["tetra"].gmsh)
     order = np.argsort(numbers)
