@@ -39,6 +39,7 @@ class MotionWork:
         self._of_loads = 0.0
         self._of_impulses = 0.0
         self._driven = PathWork(motions, [])
+        self._drives = any(motion.amplitude for motion in motions)
         self._time, self._powers = 0.0, None
 
     @property
@@ -48,7 +49,8 @@ class MotionWork:
     def start(self, time: float, powers: Powers, impulse: float = 0.0) -> None:
         """Begin a smooth piece; impulse: the work of a jump of driven velocities just before it."""
         self._of_impulses += impulse
-        self._driven.start(time / self.duration, powers.reactions, np.zeros(0))
+        if self._drives:
+            self._driven.start(time / self.duration, powers.reactions, np.zeros(0))
         self._time, self._powers = time, powers
 
     def add(self, time: float, now: Powers) -> None:
@@ -56,7 +58,8 @@ class MotionWork:
         before, h = self._powers, time - self._time
         self.dissipated += h / 2 * (before.loss + now.loss) + h * h / 12 * (before.loss_rate - now.loss_rate)
         self._of_loads += self._load_work(time, before, now)
-        self._driven.add(time / self.duration, now.reactions, np.zeros(0))
+        if self._drives:
+            self._driven.add(time / self.duration, now.reactions, np.zeros(0))
         self._time, self._powers = time, now
 
     def add_known(self, work: float, dissipated: float) -> None:
