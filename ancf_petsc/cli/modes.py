@@ -1,0 +1,47 @@
+"""`ancf modes`: the first natural frequencies of a case's body and their shapes."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ancf_petsc.cli.run import add_case_arguments, changes
+from ancf_petsc.errors import CaseError
+
+HELP = "natural frequencies and shapes of a case's body"
+PETSC_OPTIONS = True
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_case_arguments(parser)
+    parser.add_argument("--count", type=int, default=10, metavar="N", help="how many modes (default 10)")
+    parser.add_argument("--loaded", action="store_true", help="of the body at rest under its loads")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="where the shapes go (default results/NAME_modes)"
+    )
+    parser.add_argument("--force", action="store_true", help="overwrite a folder that holds something else")
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    from mpi4py import MPI
+
+    from ancf_petsc import log
+    from ancf_petsc.case.load import load_case
+    from ancf_petsc.case.vibration import find_modes
+    from ancf_petsc.cli.console import show_table
+    from ancf_petsc.parallel.exchange import on_root
+
+    if arguments.count < 1:
+        raise CaseError(file="ancf modes", key="--count", got=arguments.count, expected="a whole number >= 1")
+    comm = MPI.COMM_WORLD
+    log.configure(rank=comm.rank)
+    read = on_root(comm, lambda: load_case(arguments.case, changes(arguments), arguments.petsc_options))
+    case = comm.bcast(read)
+    folder = arguments.out or Path("results") / f"{case.name}_modes"
+    rows = find_modes(case, folder, arguments.count, loaded=arguments.loaded, force=arguments.force, comm=comm)
+    if comm.rank == 0:
+        title = "modes of the body under its loads" if arguments.loaded else "modes of the unloaded body"
+        columns = ("mode", "frequency", "period", "omega", "alpha = 4 pi / T")
+        show_table(columns, [(int(row[0]), *map(float, row[1:])) for row in rows], title=title)
+        print(f"shapes in {folder}; ancf view {folder} shows them one by one")
+    return 0
