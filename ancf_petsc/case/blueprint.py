@@ -13,44 +13,46 @@ from ancf_petsc.element.catalog import element
 from ancf_petsc.element.element import Element
 from ancf_petsc.errors import CaseError
 from ancf_petsc.mesh.check import connected_pieces
-from ancf_petsc.mesh.groups import cells_of, choose_groups, find_group, measure, parts_for_load, surface_of
-from ancf_petsc.mesh.kinds import part_kind, part_sizes
+from ancf_petsc.mesh.complete import complete
+from ancf_petsc.mesh.groups import (
+    cells_of,
+    choose_groups,
+    find_group,
+    measure,
+    parts_for_load,
+    parts_for_support,
+    surface_of,
+)
 from ancf_petsc.mesh.mesh import Group, Mesh
 from ancf_petsc.mesh.read import read_mesh
 from ancf_petsc.system.constraint import ConstraintTable, Motion, Support, tabulate
 from ancf_petsc.system.free_motion import free_motions
-from ancf_petsc.system.load import linear_shares
 from ancf_petsc.system.measures import AXES, CurveChoice
 from ancf_petsc.system.ramp import make_ramp
+from ancf_petsc.system.slopes import prescribed_slopes
+from ancf_petsc.system.space import Space
 
 STROKE = "stroke"
 
 
 @dataclass
 class Blueprint:
-    """Tables over all nodes in use (n) and all cells (e), in file order.
+    """Tables over all nodal vectors (v) and all cells (e), in file order.
 
-    cells (e, k): indices of nodes in use. nodes (n,): their index in the mesh's points.
-    shares: force load number -> (n,) share of each node in the total.
-    members: group -> (n,) bool. means: name -> (n,) weights that add up to 1.
+    space: nodes, nodal vectors and cells. shares: force load number -> (v,) share of each nodal vector in the total.
+    members: group -> (v,) bool, positions of its nodes. means: name -> (v,) weights of a mean position.
     material (e,): index into the case's materials.
     """
 
     mesh: Mesh
     element: Element
-    nodes: NDArray[np.int64]
-    cells: NDArray[np.int64]
+    space: Space
     constraints: ConstraintTable
     material: NDArray[np.int8]
     curve: CurveChoice | None
     shares: dict[int, NDArray] = field(default_factory=dict)
     members: dict[str, NDArray] = field(default_factory=dict)
     means: dict[str, NDArray] = field(default_factory=dict)
-
-    @property
-    def points(self) -> NDArray[np.float64]:
-        """(n, 3) undeformed positions of the nodes in use."""
-        return self.mesh.points[self.nodes]
 
 
 def draw(case: Case) -> Blueprint:
@@ -67,18 +69,23 @@ def draw(case: Case) -> Blueprint:
 
 def draw_on(case: Case, mesh: Mesh) -> Blueprint:
     """The tables of a case on a mesh that was read for it. Raises CaseError."""
-    spec = case.spec
+    spec, row = case.spec, element(case.spec.mesh.element)
+    try:
+        row.rule(spec.mesh.rule)
+    except CaseError as error:
+        error.file = case.file
+        raise
+    complete(mesh, row)
     chosen = {name: group.model_dump(exclude_none=True) for name, group in spec.groups.items()}
     mesh.groups |= choose_groups(mesh, chosen, file=case.file)
-    drawer = _Drawer(case, mesh)
+    drawer = _Drawer(case, mesh, row)
     constraints = drawer.constraints()
     if spec.statics is not None:
         drawer.refuse_free_motions(constraints)
     return Blueprint(
         mesh=mesh,
-        element=element(spec.mesh.element),
-        nodes=drawer.nodes,
-        cells=drawer.compact[mesh.cells],
+        element=row,
+        space=drawer.space,
         constraints=constraints,
         material=drawer.materials(),
         curve=drawer.curve(),
@@ -91,36 +98,78 @@ def draw_on(case: Case, mesh: Mesh) -> Blueprint:
 class _Drawer:
     """Fills the tables of a blueprint, one method a table."""
 
-    def __init__(self, case: Case, mesh: Mesh) -> None:
+    def __init__(self, case: Case, mesh: Mesh, row: Element) -> None:
         self.file = case.file
         self.spec: CaseSpec = case.spec
         self.mesh = mesh
-        self.nodes = np.flatnonzero(mesh.used)
-        self.compact = np.full(len(mesh.points), -1, np.int64)
-        self.compact[self.nodes] = np.arange(len(self.nodes))
+        self.element = row
+        self.space = Space(mesh, row)
+        self.normal = self._normal()
+
+    def _normal(self) -> int | None:
+        """The axis a plane body does not move along; that of a straight beam is one the case does not speak of."""
+        if self.element.components == 3:
+            return None
+        flat = [i for i in range(3) if np.abs(self.space.axes[i]).max() < 1e-9]
+        if not flat:
+            raise CaseError(
+                "the beam lies along no plane of the axes",
+                file=self.file,
+                key="mesh.file",
+                expected="a line in a plane x-y, y-z or z-x",
+                cure="turn the mesh",
+            )
+        spoken = [load.total if isinstance(load, ForceSpec) else load.acceleration for load in self.spec.load]
+        spoken += [self.spec.initial.velocity] if self.spec.initial else []
+        used = {i for vector in spoken for i in range(3) if vector[i]}
+        used |= {AXES.index(axis) for spec in self.spec.constraint for axis in spec.move}
+        return next((i for i in reversed(flat) if i not in used), flat[-1])
+
+    def positions(self, group: Group) -> NDArray[np.int64]:
+        """The nodal vectors that are positions of a group's nodes."""
+        return self.space.first[self.space.compact[group.nodes]]
 
     def group(self, name: str, key: str) -> Group:
         return find_group(self.mesh, name, key, self.file)
 
     def constraints(self) -> ConstraintTable:
-        supports = []
+        supports, tangents = [], []
         for spec in self.spec.constraint:
             group = self.group(spec.group, f"constraint.{spec.group}.group")
             ramp = make_ramp(spec.ramp, "linear")
             motions = {AXES.index(axis): Motion(0.0, ramp) for axis in spec.fix}
             motions |= {AXES.index(axis): Motion(amount, ramp) for axis, amount in spec.move.items()}
-            supports.append(Support(spec.group, self.compact[group.nodes], motions))
+            supports.append(Support(spec.group, self.positions(group), motions))
+            if self.element.has_slopes:
+                tangents.append((set(motions), parts_for_support(self.mesh, group)))
+        numbers = self.mesh.node_numbers[self.space.nodes][self.space.node_of()]
         try:
-            return tabulate(supports, len(self.nodes), self.mesh.node_numbers[self.nodes])
+            table = tabulate(supports, self.space.vectors, numbers)
         except CaseError as error:
             error.file = self.file
             raise
+        if self.element.has_slopes:
+            self._hold_slopes(table, tangents)
+        if self.normal is not None:
+            table.hold(np.arange(self.space.vectors), self.normal)
+        return table
+
+    def _hold_slopes(self, table: ConstraintTable, tangents: list) -> None:
+        """What is prescribed along surfaces and lines holds the slopes along them."""
+        held, odd = prescribed_slopes(self.space, tangents)
+        for axis in range(3):
+            table.hold(np.flatnonzero(held[:, axis]), axis)
+        if odd:
+            self.mesh.notes.append(
+                f"at {odd} nodes surfaces at odd angles hold different components: all slopes of these components are held"
+            )
 
     def refuse_free_motions(self, constraints: ConstraintTable) -> None:
         """Raise CaseError if a connected piece of the body can move without deforming."""
-        pieces, label = connected_pieces(self.compact[self.mesh.cells], len(self.nodes))
-        points = self.mesh.points[self.nodes]
-        free = free_motions(points, constraints.motion >= 0, label, pieces)
+        space = self.space
+        pieces, label = connected_pieces(space.cells, len(space.nodes))
+        points, driven = space.points, constraints.motion[space.positions] >= 0
+        free = free_motions(points, driven, label, pieces, normal=self.normal)
         if not free:
             return
         piece, names = next(iter(free.items()))
@@ -183,8 +232,7 @@ class _Drawer:
         for number, spec in enumerate(self.spec.load):
             if isinstance(spec, ForceSpec):
                 group = self.group(spec.group, f"load.{number}.group")
-                dimension, parts = parts_for_load(self.mesh, group)
-                shares[number] = self._shares(dimension, parts)
+                shares[number] = self.space.shares(*parts_for_load(self.mesh, group))
         return shares
 
     def curve(self) -> CurveChoice | None:
@@ -193,10 +241,23 @@ class _Drawer:
             return None
         group = self.group(chosen.force.group, "output.curve.force")
         self.group(chosen.stroke.group, "output.curve.stroke")
-        faces = surface_of(self.mesh, group)
-        area = None if faces is None else measure(self.mesh, 2, faces)
         return CurveChoice(
-            chosen.force.group, chosen.force.component, chosen.stroke.group, chosen.stroke.component, area
+            chosen.force.group,
+            chosen.force.component,
+            chosen.stroke.group,
+            chosen.stroke.component,
+            self._area(group),
+        )
+
+    def _area(self, group: Group) -> float | None:
+        """Undeformed area of a group that is a surface; of a plane body the length of its sides times the thickness."""
+        d = self.element.cell.dimension
+        faces = surface_of(self.mesh, group) if d > 1 else None
+        if faces is None:
+            return None
+        section = self.spec.section
+        return measure(self.mesh, d - 1, faces) * (
+            section.thickness if section and section.thickness else 1.0
         )
 
     def members(self) -> dict[str, NDArray]:
@@ -206,8 +267,8 @@ class _Drawer:
             names.append(self.spec.output.curve.force.group)
         members = {}
         for name in dict.fromkeys(names):
-            members[name] = np.zeros(len(self.nodes), bool)
-            members[name][self.compact[self.mesh.groups[name].nodes]] = True
+            members[name] = np.zeros(self.space.vectors, bool)
+            members[name][self.positions(self.mesh.groups[name])] = True
         return members
 
     def means(self) -> dict[str, NDArray]:
@@ -223,8 +284,8 @@ class _Drawer:
         return means
 
     def _node_mean(self, group: Group) -> NDArray:
-        weights = np.zeros(len(self.nodes))
-        weights[self.compact[group.nodes]] = 1.0 / len(group.nodes)
+        weights = np.zeros(self.space.vectors)
+        weights[self.positions(group)] = 1.0 / len(group.nodes)
         return weights
 
     def _area_mean(self, group: Group, name: str) -> NDArray:
@@ -238,15 +299,7 @@ class _Drawer:
                 expected="a group of boundary faces",
                 cure='mean = "nodes" takes any group',
             )
-        return self._shares(2, faces)
-
-    def _shares(self, dimension: int, parts: NDArray) -> NDArray:
-        """Shares (n,) of the nodes in a sum spread evenly over parts."""
-        if dimension == 0:
-            parts, sizes = parts.reshape(-1, 1), np.ones(len(parts))
-        else:
-            sizes = np.abs(part_sizes(self.mesh.points, parts, part_kind(dimension, parts.shape[1])))
-        return linear_shares(len(self.mesh.points), parts, sizes)[self.nodes]
+        return self.space.shares(self.element.cell.dimension - 1, faces)
 
 
 def output_times(spec: CaseSpec, file: object = None) -> list[float]:

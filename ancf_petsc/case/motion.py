@@ -15,7 +15,6 @@ from ancf_petsc.case.load import Case
 from ancf_petsc.case.motion_run import MotionRun
 from ancf_petsc.case.record import Record
 from ancf_petsc.case.schema import InitialSpec
-from ancf_petsc.element.catalog import element
 from ancf_petsc.errors import CaseError
 from ancf_petsc.solve.dynamics import steps_in, warn_of_long_step
 from ancf_petsc.solve.equations import Equations
@@ -35,7 +34,7 @@ class Motion:
         self.spec, self.built = spec, built
         self.assembly = Assembly(built.model)
         self.comm = self.assembly.comm
-        self.mass = Mass(self.assembly, element(case.spec.mesh.element), lumped=spec.mass == "lumped")
+        self.mass = Mass(self.assembly, lumped=spec.mass == "lumped")
         damping = damping_of(case, self.assembly, self.mass)
         self.equations = Equations(self.assembly, self.mass, damping, spec.duration)
         self.times = [spec.duration * k / spec.outputs for k in range(1, spec.outputs + 1)]
@@ -94,5 +93,7 @@ def set_velocity(v: PETSc.Vec, mass: Mass, spec: InitialSpec) -> None:
     """A rigid motion of the undeformed body: uniform velocity and spin about a point. Collective."""
     model = mass.assembly.model
     centre = mass.centre() if spec.centre == "mass" else np.array(spec.centre)
-    arm = model.reference[: model.owned] - centre
-    v.array[:] = (np.array(spec.velocity) + np.cross(spec.spin, arm)).ravel()
+    arm, uniform = model.reference[: model.owned].copy(), np.zeros((model.owned, 3))
+    arm[model.own_positions] -= centre
+    uniform[model.own_positions] = spec.velocity
+    v.array[:] = (uniform + np.cross(spec.spin, arm)).ravel()

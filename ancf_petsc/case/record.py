@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from ancf_petsc.case.blueprint import STROKE
 from ancf_petsc.case.build import Built
+from ancf_petsc.case.drawn import DrawnPoints
 from ancf_petsc.case.schema import CaseSpec
 from ancf_petsc.parallel.exchange import ToSlabs
 from ancf_petsc.results.store import ResultStore
@@ -32,7 +33,7 @@ class Record:
         self.row: dict[str, float] = {}
         self._tables: dict[str, Table] = {}
         order, numbering = built.order, assembly.model.numbering
-        self._nodes = ToSlabs(self.comm, order.node_rows, order.total_nodes)
+        self._drawn = DrawnPoints(assembly, order)
         self._own_cells = np.flatnonzero(numbering.own_cells)
         self._cells = ToSlabs(self.comm, numbering.file_cells[self._own_cells], order.total_cells)
         self._store = ResultStore(folder, self.comm, spec.title, spec.units, note=spec.note, version=version)
@@ -55,7 +56,7 @@ class Record:
     ) -> dict[str, float]:
         """One output at the state x. time: the one column of time; more: columns the solver knows.
 
-        node_fields: further fields (n, ...) on owned nodes. Returns the row of the curve.
+        node_fields: further fields (n, 3) on owned nodal vectors. Returns the row of the curve.
         """
         strain, cauchy, det = self.assembly.fields(x)
         row = {**time, **self.curve(x, out_of_balance), **self._stress_force(cauchy)}
@@ -66,18 +67,20 @@ class Record:
         self._append("curve.csv", row)
         if self.spec.probe:
             self._append("probes.csv", {**time, **self._probes(x)})
-        displacement = x.array_r.reshape(-1, 3) - self.assembly.model.reference[: self.assembly.model.owned]
-        nodes = {"displacement": displacement, **(node_fields or {})}
+        positions, model = x.array_r.reshape(-1, 3), self.assembly.model
+        nodes = {"displacement": positions - model.reference[: model.owned], **(node_fields or {})}
+        points = {name: self._drawn(rows) for name, rows in nodes.items()}
+        if model.element.has_slopes:
+            points["slopes"] = self._drawn.slopes(positions)
         cells = {"green_lagrange": strain, "cauchy": cauchy, "von_mises": von_mises(cauchy), "det_F": det}
         (now,) = time.values()
         self._store.write_step(
             now,
+            points,
             {
-                name: self._nodes(rows, self._blank(self.built.order.points, rows))
-                for name, rows in nodes.items()
-            },
-            {
-                name: self._cells(rows[self._own_cells], self._blank(self.built.order.cells, rows))
+                name: self._cells(
+                    rows[self._own_cells], np.zeros((len(self.built.order.cells), *rows.shape[1:]))
+                )
                 for name, rows in cells.items()
             },
         )
@@ -131,8 +134,3 @@ class Record:
         if file not in self._tables:
             self._tables[file] = Table(self.folder / file, list(row))
         self._tables[file].append(row)
-
-    @staticmethod
-    def _blank(like: NDArray, rows: NDArray) -> NDArray:
-        """A zero slab with as many rows as `like` and the components of `rows`."""
-        return np.zeros((len(like), *rows.shape[1:]))

@@ -18,6 +18,7 @@ from ancf_petsc.case.motion import Motion
 from ancf_petsc.case.record import Record
 from ancf_petsc.case.signals import StopRequest
 from ancf_petsc.case.versions import program_version, versions
+from ancf_petsc.element.catalog import element
 from ancf_petsc.errors import Interrupted
 from ancf_petsc.kernel.warmup import compile_kernels, is_compiled
 from ancf_petsc.log import log_file
@@ -78,10 +79,11 @@ def _read(case: Case) -> Blueprint:
 def _compile(case: Case, comm: MPI.Comm) -> None:
     """Compile the kernels on the root rank, so that the others load them."""
     laws = [law_named(name) for name in sorted({material.law for material in case.spec.material})]
+    row = element(case.spec.mesh.element)
     mean = case.spec.dynamics is not None and case.spec.dynamics.integrator == "energy_momentum"
-    if comm.rank == 0 and not is_compiled(laws, mean=mean):
+    if comm.rank == 0 and not is_compiled(row, laws, mean=mean):
         log.info("compiling kernels (%s): once, under half a minute", ", ".join(law.name for law in laws))
-    on_root(comm, lambda: compile_kernels(laws, mean=mean))
+    on_root(comm, lambda: compile_kernels(row, laws, mean=mean))
 
 
 def _solve(

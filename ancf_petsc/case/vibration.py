@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from ancf_petsc.case.blueprint import draw
 from ancf_petsc.case.build import build_from
 from ancf_petsc.case.damping import static_answer
+from ancf_petsc.case.drawn import DrawnPoints
 from ancf_petsc.case.load import Case
 from ancf_petsc.case.versions import program_version
-from ancf_petsc.element.catalog import element
 from ancf_petsc.errors import CaseError
-from ancf_petsc.parallel.exchange import ToSlabs, on_root
+from ancf_petsc.parallel.exchange import on_root
 from ancf_petsc.results.folder import check_folder, claim_folder
 from ancf_petsc.results.store import ResultStore
 from ancf_petsc.results.tables import Table
@@ -44,7 +44,7 @@ def find_modes(
         built = build_from(case, on_root(comm, lambda: draw(case)), comm)
         assembly = Assembly(built.model)
         lumped = case.spec.dynamics is not None and case.spec.dynamics.mass == "lumped"
-        mass = Mass(assembly, element(case.spec.mesh.element), lumped=lumped)
+        mass = Mass(assembly, lumped=lumped)
         x = static_answer(case, assembly) if loaded else assembly.reference_vector()
         modes = modes_at(assembly, mass, x, count)
         refuse_unused(case.spec.petsc)
@@ -59,12 +59,12 @@ def find_modes(
     store.write_mesh(
         order.points, order.kind, order.cells, order.node_numbers, order.cell_numbers, order.groups
     )
-    to_file = ToSlabs(comm, order.node_rows, order.total_nodes)
+    drawn = DrawnPoints(assembly, order)
     before = x.array_r.reshape(-1, 3) - built.model.reference[: built.model.owned]
     for row, shape in zip(rows, modes.shapes, strict=True):
-        largest = comm.allreduce(float(np.abs(shape).max(initial=0.0)), MPI.MAX)
+        largest = comm.allreduce(float(np.abs(shape[built.model.own_positions]).max(initial=0.0)), MPI.MAX)
         shown = before + LARGEST_SHOWN * built.model.size / largest * shape
-        fields = {"displacement": to_file(shown, np.zeros((len(order.points), 3)))}
+        fields = {"displacement": drawn(shown)}
         store.write_step(row[0], fields, {}, {"frequency": row[1]})
     return rows
 

@@ -80,13 +80,13 @@ def _print_case(case: Case, blueprint: Blueprint) -> None:
     from ancf_petsc.cli.console import show_facts
 
     spec = case.spec
-    dof = 3 * len(blueprint.nodes)
-    driven = int((blueprint.constraints.motion >= 0).sum())
+    dof = blueprint.element.components * blueprint.space.vectors
+    driven = dof - int((blueprint.constraints.motion < 0).sum())
     facts: list[tuple[str, object]] = [
         ("case", spec.title),
         ("analysis", _analysis(case)),
         ("degrees of freedom", f"{dof}, {driven} of them held or moved"),
-        ("memory", f"about {memory_estimate(len(blueprint.cells), dof) / 1e9:.2g} GB over all ranks"),
+        ("memory", f"about {memory_estimate(len(blueprint.space.cells), dof) / 1e9:.2g} GB over all ranks"),
     ]
     counts = np.bincount(blueprint.material, minlength=len(spec.material))
     for material, count in zip(spec.material, counts, strict=True):

@@ -93,6 +93,16 @@ class Element:
     def has_slopes(self) -> bool:
         return self.corner > 1
 
+    @property
+    def is_beam(self) -> bool:
+        """Whether its strains are those of an axis, stretched and bent."""
+        return self.cell.dimension < min(self.components, 2)
+
+    @property
+    def is_curved(self) -> bool:
+        """Whether edges of a deformed cell are curved."""
+        return self.has_slopes or self.edge > 0
+
     @cached_property
     def nodes(self) -> tuple[Node, ...]:
         """Corners, then middles of edges, then centres of faces, as the element has them."""
@@ -189,7 +199,7 @@ class Element:
         """The quadrature called default, reduced, exact or mass. Raises CaseError where there is none."""
         if name not in self.points:
             raise CaseError(
-                key="mesh.quadrature",
+                key="mesh.rule",
                 got=name,
                 expected=f"a quadrature of element {self.code}",
                 cure=did_you_mean(name, tuple(self.points)),

@@ -1,9 +1,9 @@
 """What happens inside one cell of any element, on plain arrays; the loops over cells are in `generic`.
 
 `local` (a, 3) are nodal vectors of a cell in its reference cell: positions from the first node, slopes along
-xi. slot (a) is 0 for positions and j for the slope along axis j, J the jacobian of the cell and inverse that
-of J, dN (a, 3) the gradients of the shape functions with respect to xi at a point, G (a, 3) those with
-respect to X for slopes along the axes. A (3 J, 3 L, 9 ik) is dP/dF.
+xi. slot (a) is 0 for positions and j for the j-th slope, J (s, 3, 3) turns the slopes of each node into slopes along
+xi, inverse (9) is that of the jacobian of the cell, dN (a, 3) the gradients of the shape functions with respect to xi
+at a point, G (a, 3) those with respect to X for the nodal vectors. A (3 J, 3 L, 9 ik) is dP/dF.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def gather(positions, nodes, slot, J, local):
             else:
                 along = 0.0
                 for j in range(slopes):
-                    along += J[j, k - 1] * positions[nodes[a - k + 1 + j], i]
+                    along += J[a // (slopes + 1), j, k - 1] * positions[nodes[a - k + 1 + j], i]
                 local[a, i] = along
 
 
@@ -50,7 +50,7 @@ def scatter(force, nodes, slot, J, local):
             else:
                 along = 0.0
                 for k in range(slopes):
-                    along += J[j - 1, k] * local[a - j + 1 + k, i]
+                    along += J[a // (slopes + 1), j - 1, k] * local[a - j + 1 + k, i]
                 force[nodes[a], i] += along
 
 
@@ -78,7 +78,7 @@ def add_stress(local, dN, inverse, P):
 
 @register_jitable
 def cartesian_gradients(dN, slot, J, inverse, G):
-    """Gradients with respect to X, for slopes along the axes, into G (a, 3)."""
+    """Gradients with respect to X of the functions of the nodal vectors into G (a, 3)."""
     slopes = slot.max()
     for a in range(slot.size):
         j = slot[a]
@@ -88,9 +88,10 @@ def cartesian_gradients(dN, slot, J, inverse, G):
         else:
             for k in range(slopes):
                 b = a - j + 1 + k
-                u += J[j - 1, k] * dN[b, 0]
-                v += J[j - 1, k] * dN[b, 1]
-                w += J[j - 1, k] * dN[b, 2]
+                factor = J[a // (slopes + 1), j - 1, k]
+                u += factor * dN[b, 0]
+                v += factor * dN[b, 1]
+                w += factor * dN[b, 2]
         for i in range(3):
             G[a, i] = u * inverse[i] + v * inverse[3 + i] + w * inverse[6 + i]
 
@@ -102,13 +103,13 @@ def combine(x, a, y, b, z, c):
 
 
 @register_jitable
-def add_products(A, G, a, rows):
-    """Add sum_JL A_iJkL G_aJ G_bL to rows (b, 9 ik), for b from a on."""
+def add_products(A, G, a, first, rows):
+    """Add sum_JL A_iJkL G_aJ G_bL to rows (b, 9 ik), for b from `first` on."""
     x, y, z = G[a, 0], G[a, 1], G[a, 2]
     along_x = combine(x, nine(A[0, 0]), y, nine(A[1, 0]), z, nine(A[2, 0]))
     along_y = combine(x, nine(A[0, 1]), y, nine(A[1, 1]), z, nine(A[2, 1]))
     along_z = combine(x, nine(A[0, 2]), y, nine(A[1, 2]), z, nine(A[2, 2]))
-    for b in range(a, G.shape[0]):
+    for b in range(first, G.shape[0]):
         block = combine(G[b, 0], along_x, G[b, 1], along_y, G[b, 2], along_z)
         for ik in range(9):
             rows[b, ik] += block[ik]

@@ -9,26 +9,64 @@ share a cell is kept, in rows of the graph of `neighbours`:
 from __future__ import annotations
 
 import numpy as np
+from numba.extending import register_jitable
 
 from ancf_petsc.kernel.compiled import kernel
 
 
+@register_jitable
+def turn_rows(matrix, slot, J, turned):
+    """Rows for the slopes of nodes into `turned` (a, b) from rows (a, b) for slopes along xi. J (s, 3, 3)."""
+    slopes = slot.max()
+    for a in range(slot.size):
+        j = slot[a]
+        for b in range(matrix.shape[1]):
+            if j == 0:
+                turned[a, b] = matrix[a, b]
+            else:
+                turned[a, b] = 0.0
+                for k in range(slopes):
+                    turned[a, b] += J[a // (slopes + 1), j - 1, k] * matrix[a - j + 1 + k, b]
+
+
+@register_jitable
+def lump(mass, slot):
+    """Scale the diagonal of a cell's mass (a, b) so that positions carry all of it, and drop the rest.
+
+    Hinton, Rock and Zienkiewicz, Earthquake Engng Struct. Dyn. 4 (1976) 245: positive for every element.
+    """
+    carried = 0.0
+    for a in range(slot.size):
+        if slot[a] == 0:
+            carried += mass[a, a]
+    for a in range(slot.size):
+        for b in range(slot.size):
+            mass[a, b] = mass[a, b] / carried if a == b else 0.0
+
+
 @kernel
-def add_mass(cells, weights, shape_mass, first, last, pointers, columns, mass):
+def add_mass(cells, weights, shape_mass, slot, jacobians, lumped, first, last, pointers, columns, mass):
     """Add the mass of cells first:last to `mass`.
 
-    weights (e,): mass of each cell. shape_mass (a, b): mean of N_a N_b over a cell.
+    weights (e,): mass of each cell. shape_mass (a, b): mean of N_a N_b over the reference cell. slot (a): 0 for a position,
+    j for the j-th slope. jacobians (e, s, 3, 3): from the slopes of nodes to those along xi.
     """
-    rows = pointers.size - 1
+    rows, n = pointers.size - 1, slot.size
+    half, local = np.empty((n, n)), shape_mass.copy()
     for e in range(first, last):
-        for a in range(cells.shape[1]):
+        if jacobians.shape[1] > 0:
+            turn_rows(shape_mass, slot, jacobians[e], half)
+            turn_rows(half.T, slot, jacobians[e], local)
+        if lumped and (e == first or jacobians.shape[1] > 0):
+            lump(local, slot)
+        for a in range(n):
             i = cells[e, a]
             if i >= rows:
                 continue
             low, high = pointers[i], pointers[i + 1]
-            for b in range(cells.shape[1]):
-                slot = low + np.searchsorted(columns[low:high], cells[e, b])
-                mass[slot] += weights[e] * shape_mass[a, b]
+            for b in range(n):
+                place = low + np.searchsorted(columns[low:high], cells[e, b])
+                mass[place] += weights[e] * local[a, b]
 
 
 @kernel

@@ -145,7 +145,7 @@ def _tangent(law: Law) -> Callable:
             for a in range(n):
                 rows[:] = 0.0
                 for q in range(points):
-                    add_products(A[q], G[q], a, rows)
+                    add_products(A[q], G[q], a, a, rows)
                 add_rows(values, rows, a, cells[e], starts[e], strides, split, driven)
 
     return tangent

@@ -1,9 +1,11 @@
 """What the generic kernels take of the cells of one element.
 
-Nodal slopes are along the axes; J turns them into slopes of the reference cell, so that shape functions are
-the same numbers for all cells. Plane elements are solids with a third axis that does nothing: base_33 = 1 is
-plane strain, and volumes have the thickness in them. Plane stress of St Venant and Kirchhoff is plane strain
-with the condensed first Lame parameter.
+A nodal slope is the derivative of r along a direction, times a length: its undeformed value says which. J turns
+slopes into those of the reference cell, so that shape functions are the same numbers for all cells.
+
+Elements of the plane are solids with a third axis that does nothing: F has a one along the normal, which is plane
+strain, and volumes have the thickness in them. Plane stress of St Venant and Kirchhoff is plane strain with the condensed
+first Lame parameter. Volumes of beams have the area in them.
 """
 
 from __future__ import annotations
@@ -19,7 +21,11 @@ Floats = NDArray[np.float64]
 
 
 class Maps(NamedTuple):
-    """The affine maps X = X0 + J xi: jacobians (e, 3, 3) and inverses (e, 3, 3)."""
+    """Affine maps X = X0 + J xi of cells, for kernels.
+
+    jacobians (e, s, 3, 3): of each node s with slopes, from its slopes j to those along xi_k.
+    inverses (e, 3, 3): dxi/dX; of a beam one over its length.
+    """
 
     jacobians: Floats
     inverses: Floats
@@ -28,8 +34,8 @@ class Maps(NamedTuple):
 class Reference(NamedTuple):
     """Shape functions a of the reference cell at quadrature points q.
 
-    gradients (q, a, 3): dN/dxi. weights (q): fractions of the volume, their sum is 1. slot (a): 0 for a
-    position, j for the slope along axis j. base (9,): what F has without nodal vectors.
+    gradients (q, a, 3): dN/dxi; of a beam the first and the second derivative. weights (q): fractions of the volume,
+    their sum is 1. slot (a): 0 for a position, j for the j-th slope. base (9,): what F has without nodal vectors.
     """
 
     gradients: Floats
@@ -55,37 +61,71 @@ def make_tables(
     cells: ArrayLike,
     corners: ArrayLike,
     *,
+    directions: ArrayLike | None = None,
+    axes: ArrayLike | None = None,
     quadrature: str = "default",
     thickness: float = 1.0,
     numbers: ArrayLike | None = None,
 ) -> Tables:
-    """Tables of cells (e, a) from undeformed corners (e, c, 3); `numbers` (e) are for messages.
+    """Tables of cells (e, a) from undeformed corners (e, c, 3).
 
+    directions (e, s, d, 3): undeformed slopes of the nodes with slopes, default the axes. axes (3, d): those a plane body
+    lies along, default x and y. thickness: of a plane body; the area of a beam. numbers (e): for messages.
     Raises MeshError for cells that cannot be computed with, CaseError for a quadrature the element has not.
     """
-    geometry = element.geometry(corners, numbers)
-    volume = float(element.cell.volume) * (1.0 if element.cell.dimension == 3 else thickness)
+    corners = np.asarray(corners, dtype=float)
+    d = element.cell.dimension
+    frame = np.eye(3)[:, :d] if axes is None else np.asarray(axes, dtype=float)
+    geometry = element.geometry(corners if d == 3 or axes is None else corners @ frame, numbers)
+    if directions is None:
+        directions = np.broadcast_to(frame.T, (len(corners), nodes_with_slopes(element), d, 3))
+    inverses = np.zeros((len(corners), 3, 3))
+    inverses[:, :d] = np.einsum("ekj,ij->eki", geometry.inverse, frame)
+    if element.is_beam:
+        inverses[:, 0, 0] = geometry.inverse[:, 0, 0]
+    volume = float(element.cell.volume) * (1.0 if d == 3 else thickness)
     return Tables(
         np.ascontiguousarray(cells, dtype=np.int32),
-        Maps(_in_space(geometry.jacobian), _in_space(geometry.inverse)),
+        Maps(slope_maps(geometry.jacobian, frame, np.asarray(directions)), inverses),
         geometry.determinant * volume,
-        make_reference(element, quadrature),
+        make_reference(element, quadrature, frame),
     )
 
 
-def make_reference(element: Element, quadrature: str = "default") -> Reference:
+def nodes_with_slopes(element: Element) -> int:
+    """How many nodes of a cell carry slopes: its corners or none."""
+    return len(element.cell.corners) if element.has_slopes else 0
+
+
+def slope_maps(jacobian: Floats, axes: Floats, directions: Floats) -> Floats:
+    """(e, s, 3, 3) from slopes along `directions` (e, s, d, 3), orthogonal ones, to slopes along xi. jacobian (e, d, d)."""
+    d = jacobian.shape[-1]
+    edges = np.einsum("ij,ejk->eik", axes, jacobian)
+    squares = np.einsum("esmi,esmi->esm", directions, directions)
+    full = np.zeros((*directions.shape[:2], 3, 3))
+    full[..., :d, :d] = np.einsum("esmi,eik->esmk", directions, edges) / squares[..., None]
+    return full
+
+
+def turn_functions(values: Floats, maps: Floats, element: Element) -> Floats:
+    """Functions (e, a) of the nodal vectors from those of the reference cell, (a) or (e, a); maps (e, s, 3, 3)."""
+    d, (e, s) = element.cell.dimension, maps.shape[:2]
+    turned = np.array(np.broadcast_to(values, (e, element.functions)))
+    if s:
+        by_node = turned[:, : s * (d + 1)].reshape(e, s, d + 1)
+        by_node[..., 1:] = np.einsum("esmk,esk->esm", maps[..., :d, :d], by_node[..., 1:])
+        turned[:, : s * (d + 1)] = by_node.reshape(e, -1)
+    return turned
+
+
+def make_reference(element: Element, quadrature: str = "default", axes: ArrayLike | None = None) -> Reference:
     """Shape functions of an element at the points of a named quadrature."""
     tables = element.tables(quadrature)
     d = element.cell.dimension
     gradients = np.zeros((*tables.values.shape, 3))
     gradients[..., :d] = tables.gradients
-    base = np.diag([0.0] * d + [1.0] * (3 - d)).ravel()
+    if element.is_beam:
+        gradients[..., 1] = element.derivative(tables.points, (2,))
+    frame = np.eye(3)[:, :d] if axes is None else np.asarray(axes)
+    base = (np.eye(3) - frame @ frame.T).ravel()
     return Reference(gradients, tables.weights / tables.weights.sum(), tables.slot.astype(np.int32), base)
-
-
-def _in_space(matrices: Floats) -> Floats:
-    """Matrices (e, d, d) with ones on the diagonal of the axes they lack: (e, 3, 3)."""
-    full = np.tile(np.eye(3), (len(matrices), 1, 1))
-    d = matrices.shape[1]
-    full[:, :d, :d] = matrices
-    return full

@@ -3,57 +3,75 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ancf_petsc.element.element import Element
+from ancf_petsc.kernel.choice import way_of
 from ancf_petsc.kernel.compiled import CACHE_FOLDER
 from ancf_petsc.kernel.constant import add_mass, add_mass_blocks, mass_product
 from ancf_petsc.kernel.graph import block_starts, neighbours
-from ancf_petsc.kernel.mean import make_mean_kernels
-from ancf_petsc.kernel.tet3413 import geometry, make_kernels
+from ancf_petsc.kernel.tables import nodes_with_slopes
 from ancf_petsc.material.models import Law
 
 
-def is_compiled(laws: Sequence[Law], *, mean: bool = False) -> bool:
-    """Whether the machine code of all these laws is in the cache."""
-    return all(_mark(law, mean).exists() for law in laws)
+def is_compiled(element: Element, laws: Sequence[Law], *, mean: bool = False) -> bool:
+    """Whether the machine code of the element with all these laws is in the cache."""
+    return all(_mark(element, law, mean=mean).exists() for law in laws)
 
 
-def compile_kernels(laws: Sequence[Law], *, mean: bool = False) -> None:
-    """Compile the kernels of element 3413 for each law, or load them from the cache.
+def compile_kernels(element: Element, laws: Sequence[Law], *, mean: bool = False) -> None:
+    """Compile the kernels of an element for each law, or load them from the cache.
 
     mean: those between two states too, for the energy-momentum step.
     """
-    points = np.vstack((np.zeros(3), np.eye(3)))
-    cells = np.arange(4, dtype=np.int32).reshape(1, 4)
-    gradients, volumes = np.empty((1, 3, 3)), np.empty(1)
-    geometry(points, cells, gradients, volumes)
-    pointers, columns = neighbours(cells, 4, 4)
-    starts = block_starts(cells, 4, pointers, columns, pointers, columns, 3)
-    strides, driven, values = np.full((4, 2), 12, np.int32), np.zeros(4, np.uint8), np.zeros(144)
-    tables, force = (cells, gradients, volumes), np.zeros((4, 3))
+    n, d = element.functions, element.cell.dimension
+    cells = np.arange(n, dtype=np.int32).reshape(1, n)
+    positions = _one_cell(element)
+    pointers, columns = neighbours(cells, n, n)
+    starts = block_starts(cells, n, pointers, columns, pointers, columns, 3)
+    strides, driven, values = np.full((n, 2), 3 * n, np.int32), np.zeros(n, np.uint8), np.zeros(9 * n * n)
+    way, force = way_of(element), np.zeros((n, 3))
+    tables = way.tables(element, cells, positions, axes=np.eye(3)[:, :d])
+    matrix = (starts, strides, len(values), driven, values)
     for law in laws:
-        kernels, p = make_kernels(law), law.parameters(1.0, 0.3)
-        kernels.internal_force(points, *tables, p, 0, 1, force)
-        kernels.energy(points, *tables, p, 0, 1)
-        kernels.tangent(points, *tables, p, 0, 1, starts, strides, 144, driven, values)
-        kernels.tangent_product(points, points, *tables, p, 0, 1, force)
-        kernels.fields(points, *tables, p, 0, 1, np.empty((1, 9)), np.empty((1, 9)), np.empty(1))
-        if mean and law.mean_stress is not None:
-            between = make_mean_kernels(law)
-            between.force(points, points, *tables, p, 0, 1, force)
-            between.tangent(points, points, *tables, p, 0, 1, starts, strides, 144, driven, values)
-        _mark(law, mean).touch()
-    _compile_mass(cells, pointers, columns, points, driven, values)
+        kernels, p = way.kernels(law), law.parameters(1.0, 0.3)
+        kernels.internal_force(positions, *tables, p, 0, 1, force)
+        kernels.energy(positions, *tables, p, 0, 1)
+        kernels.tangent(positions, *tables, p, 0, 1, *matrix)
+        kernels.tangent_product(positions, positions, *tables, p, 0, 1, force)
+        kernels.fields(positions, *tables, p, 0, 1, np.empty((1, 9)), np.empty((1, 9)), np.empty(1))
+        if mean and law.mean_stress is not None and way.mean_kernels is not None:
+            between = way.mean_kernels(law)
+            between.force(positions, positions, *tables, p, 0, 1, force)
+            between.tangent(positions, positions, *tables, p, 0, 1, *matrix)
+        _mark(element, law, mean=mean).touch()
+    _compile_mass(element, cells, pointers, columns, driven, values)
 
 
-def _compile_mass(cells, pointers, columns, points, driven, values) -> None:
-    mass = np.zeros(len(columns))
-    add_mass(cells, np.ones(1), np.eye(4), 0, 1, pointers, columns, mass)
-    mass_product(pointers, columns, mass, points, np.empty((4, 3)))
+def _one_cell(element: Element) -> NDArray[np.float64]:
+    """Nodal vectors (a, 3) of the reference cell."""
+    d = element.cell.dimension
+    positions = np.zeros((element.functions, 3))
+    positions[:, :d] = element.node_coordinates[element.node]
+    for j in range(d):
+        positions[element.slot == j + 1] = np.eye(3)[j]
+    return positions
+
+
+def _compile_mass(element: Element, cells, pointers, columns, driven, values) -> None:
+    n, mass = element.functions, np.zeros(len(columns))
+    maps = np.tile(np.eye(3), (1, nodes_with_slopes(element), 1, 1))
+    slot = element.slot.astype(np.int32)
+    add_mass(cells, np.ones(1), np.eye(n), slot, maps, False, 0, 1, pointers, columns, mass)
+    mass_product(pointers, columns, mass, np.zeros((n, 3)), np.empty((n, 3)))
     none = np.zeros_like(pointers)
-    add_mass_blocks(pointers, columns, mass, 1.0, pointers, none, 144, driven, values)
+    add_mass_blocks(pointers, columns, mass, 1.0, pointers, none, 9 * n * n, driven, values)
 
 
-def _mark(law: Law, mean: bool):  # noqa: FBT001
-    return CACHE_FOLDER / f"{law.name}{'.mean' * mean}.compiled"
+def _mark(element: Element, law: Law, *, mean: bool) -> Path:
+    """The file that says: compiled. Elements computed the same way share their machine code."""
+    way = way_of(element).kernels.__module__.rpartition(".")[2]
+    return CACHE_FOLDER / f"{way}.{law.name}{'.mean' * mean}.compiled"

@@ -45,7 +45,6 @@ from ancf_petsc.material.tensor import (
     transpose,
 )
 
-
 SAME_STRAIN = 1e-6  # below it a correction of second order in the difference of strains is less than rounding
 
 
@@ -65,6 +64,12 @@ class Law(NamedTuple):
 def lame_parameters(young: float, poisson: float) -> NDArray[np.float64]:
     """Lame's first parameter and the shear modulus, in the unit of `young`."""
     return np.array([young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))])
+
+
+def plane_stress(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lame's parameters of a plane law whose stress across the plane vanishes: the first one condensed."""
+    lame, shear = parameters
+    return np.array([2 * lame * shear / (lame + 2 * shear), shear])
 
 
 # --- St Venant-Kirchhoff: S = lambda tr(E) I + 2 mu E, E = (FᵀF - I) / 2

@@ -203,6 +203,20 @@ def parts_for_load(mesh: Mesh, group: Group) -> tuple[int, Integers]:
     return (0, group.nodes) if sides is None else (_dimension(mesh) - 1, sides)
 
 
+def parts_for_support(mesh: Mesh, group: Group) -> dict[int, Integers]:
+    """Parts by dimension that a constraint on the group holds: its own; for a set of nodes the boundary sides whose nodes
+    all belong to it, else the edges of boundary sides, else nothing but its nodes."""
+    if group.parts:
+        return group.parts
+    sides = _sides_within(mesh, group.nodes)
+    if len(sides):
+        return {_dimension(mesh) - 1: sides}
+    boundary = boundary_faces(mesh)
+    edges = np.stack([boundary, np.roll(boundary, -1, axis=1)], axis=-1).reshape(-1, 2)
+    edges = edges[_belongs(mesh, group.nodes)[edges].all(axis=1)]
+    return {1: unique_rows(edges, len(mesh.points))} if len(edges) and boundary.shape[1] > 2 else {}
+
+
 def surface_of(mesh: Mesh, group: Group) -> Integers | None:
     """Sides (m, corners) the group consists of, its own or boundary sides; None where it is no surface."""
     dimension = _dimension(mesh) - 1

@@ -162,13 +162,14 @@ def part_kind(dimension: int, corners: int) -> Kind:
 def determinants(points: Floats, cells: Integers, kind: Kind) -> Floats:
     """Determinants (e, s) of the frames s of cells (e, k).
 
-    Plane cells are seen from +z; lines give lengths.
+    Plane cells are seen from the positive side of the axis they face most; lines give lengths.
     """
     edges = _frame_edges(points, cells, kind)
     if kind.dimension == 3:
         return np.einsum("esi,esi->es", edges[:, :, 0], np.cross(edges[:, :, 1], edges[:, :, 2]))
     if kind.dimension == 2:
-        return np.cross(edges[:, :, 0], edges[:, :, 1])[..., 2]
+        normals = np.cross(edges[:, :, 0], edges[:, :, 1])
+        return normals[..., int(np.abs(normals).sum(axis=(0, 1)).argmax())]
     return np.linalg.norm(edges[:, :, 0], axis=-1)
 
 

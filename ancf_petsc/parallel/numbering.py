@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.kernel.graph import neighbours
-from ancf_petsc.parallel.exchange import exchange, lookup
+from ancf_petsc.parallel.exchange import exchange, lookup, scatter_rows
 from ancf_petsc.parallel.partition import partition_nodes
 from ancf_petsc.parallel.slabs import slab_bounds
 
@@ -43,6 +43,32 @@ class Numbering:
             file_cells=self.file_cells[order],
             own_cells=self.own_cells[order],
         )
+
+
+def with_vectors(nodes: Numbering, first: NDArray | None, node: NDArray, slot: NDArray) -> Numbering:
+    """The numbering of the nodal vectors of distributed nodes, several a node. Collective.
+
+    first: (n + 1,) first vector of each node in the table on the root rank. node, slot (a,): of each vector of a cell.
+    The vectors of a node follow each other; those of owned nodes come first.
+    """
+    comm = nodes.comm
+    total = int(comm.allreduce(nodes.owned))
+    both = None if first is None else np.stack((first[:-1], np.diff(first)), axis=1)
+    starts, counts = lookup(comm, slab_bounds(total, comm.size), scatter_rows(comm, both), nodes.file_nodes).T
+    owned = int(counts[: nodes.owned].sum())
+    begin = int(comm.scan(owned) - owned)
+    local = np.concatenate(([0], np.cumsum(counts)))
+    own_numbers = begin + local[: nodes.owned]
+    bounds = np.concatenate(([0], np.cumsum(comm.allgather(nodes.owned))))
+    numbers = lookup(comm, bounds, own_numbers, nodes.numbers)
+    within = np.arange(local[-1]) - np.repeat(local[:-1], counts)
+    return replace(
+        nodes,
+        file_nodes=np.repeat(starts, counts) + within,
+        owned=owned,
+        numbers=np.repeat(numbers, counts) + within,
+        cells=np.ascontiguousarray(local[nodes.cells[:, node]] + slot, dtype=np.int32),
+    )
 
 
 def distribute(comm: MPI.Comm, cells: NDArray, total: int) -> Numbering:

@@ -15,6 +15,7 @@ from petsc4py import PETSc
 
 from ancf_petsc.solve.petsc import default_options, is_given
 from ancf_petsc.system.assembly import Assembly
+from ancf_petsc.system.rigid import rigid_motions
 
 DIRECT_LIMIT = 3_000
 MULTIGRID_LIMIT = 120_000
@@ -112,12 +113,17 @@ class LinearSolver:
         return f"{' + '.join(names)}, {self.dof} degrees of freedom"
 
     def know_rigid_motions(self, matrix: PETSc.Mat, x: PETSc.Vec) -> None:
-        """Give multigrid the rigid motions of the state x, zero at driven degrees of freedom."""
+        """Give multigrid the rigid motions of the state x."""
         if self.ksp.getPC().getType() not in ("gamg", "hypre", "ml", "bddc"):
             return
-        rigid = PETSc.NullSpace().createRigidBody(x)
+        vectors = []
+        for mode in rigid_motions(self.assembly.model, x.array_r.reshape(-1, 3)):
+            vectors.append(self.assembly.vector())
+            vectors[-1].array[:] = mode.ravel()
+        rigid = PETSc.NullSpace().create(vectors=vectors, comm=self.assembly.comm)
         matrix.setNearNullSpace(rigid)
-        rigid.destroy()
+        for item in (rigid, *vectors):
+            item.destroy()
 
     def negative_pivots(self) -> int | None:
         """How many negative pivots the last factorisation met; None if there was none by MUMPS."""

@@ -22,7 +22,7 @@ def weakest_cell(assembly: Assembly, x: PETSc.Vec) -> tuple[float, float, int, n
     if len(stretch):
         e = int(np.argmin(stretch))
         law = next(region.law.name for region in model.regions if region.first <= e < region.last)
-        centroid = model.reference[model.cells[e]].mean(axis=0)
+        centroid = model.reference[model.position_cells()[e]].mean(axis=0)
         found = (float(stretch[e]), float(det[e]), int(model.cell_numbers[e]), centroid, law)
     return min(assembly.comm.allgather(found), key=lambda item: item[0])
 

@@ -16,7 +16,6 @@ from petsc4py import PETSc
 
 from ancf_petsc.kernel.constant import add_mass_blocks
 from ancf_petsc.kernel.graph import block_starts, neighbours
-from ancf_petsc.kernel.mean import make_mean_kernels
 from ancf_petsc.system.model import Model
 
 
@@ -106,8 +105,7 @@ class Assembly:
         force[:] = 0.0
         smallest = np.inf
         for region in self.model.regions:
-            kernels = make_mean_kernels(region.law)
-            found = kernels.force(
+            found = region.mean_kernels.force(
                 before, after, *self.model.tables, region.parameters, region.first, region.last, force
             )
             smallest = min(smallest, found)
@@ -217,7 +215,7 @@ class Assembly:
         before, after = self._two_states(x0, x1)
         self._values[:] = 0.0
         for region in self.model.regions:
-            make_mean_kernels(region.law).tangent(
+            region.mean_kernels.tangent(
                 before,
                 after,
                 *self.model.tables,

@@ -44,6 +44,12 @@ class ConstraintTable:
     motion: NDArray[np.int32]
     motions: list[Motion]
 
+    def hold(self, vectors: NDArray[np.int64], axis: int) -> None:
+        """Hold a component of nodal vectors where nothing else drives it."""
+        if len(vectors):
+            free = vectors[self.motion[vectors, axis] < 0]
+            self.motion[free, axis] = _index_of(HELD, self.motions)
+
 
 def tabulate(supports: Sequence[Support], total: int, node_numbers: NDArray) -> ConstraintTable:
     """Enter all supports into one table over `total` nodal vectors.

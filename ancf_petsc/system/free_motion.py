@@ -8,17 +8,23 @@ from numpy.typing import NDArray
 AXES = ("x", "y", "z")
 
 
-def free_motions(points: NDArray, driven: NDArray, piece: NDArray, pieces: int) -> dict[int, list[str]]:
+def free_motions(
+    points: NDArray, driven: NDArray, piece: NDArray, pieces: int, normal: int | None = None
+) -> dict[int, list[str]]:
     """Names of the free rigid motions of each piece that has some.
 
     points (n, 3), driven (n, 3) bool, piece (n,) label of each node, -1 for nodes of no cell.
     A motion is free if it moves no driven degree of freedom: the null space of the 6 x 6 Gram matrix of the motions at the
-    driven degrees of freedom. Rotations are scaled by the size of the piece.
+    driven degrees of freedom. Rotations are scaled by the size of the piece. normal: of a plane body, which has no other motions
+    than those in its plane.
     """
     found = {}
+    others = np.zeros(6)
+    if normal is not None:
+        others[[normal, 3 + (normal + 1) % 3, 3 + (normal + 2) % 3]] = 1.0
     for label, gram, centre, size in _gram_matrices(points, driven, piece, pieces):
-        values, vectors = np.linalg.eigh(gram)
-        null = vectors[:, values <= 1e-12 * max(np.trace(gram), 1e-300)]
+        values, vectors = np.linalg.eigh(gram + np.diag(others))
+        null = vectors[:, values <= 1e-12 * max(np.trace(gram), others.sum(), 1e-300)]
         if null.shape[1]:
             found[label] = _names(null, centre, size)
     return found

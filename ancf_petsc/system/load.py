@@ -1,4 +1,4 @@
-"""Dead loads: consistent shares of a total force over the nodes of a group."""
+"""Dead loads."""
 
 from __future__ import annotations
 
@@ -20,13 +20,3 @@ class Load:
     pattern: NDArray[np.float64]
     ramp: Ramp
     acceleration: tuple[float, float, float] | None = None
-
-
-def linear_shares(total: int, parts: NDArray, sizes: NDArray) -> NDArray[np.float64]:
-    """Share (total,) of each node in a sum spread evenly over parts (m, corners) of the given sizes (m,).
-
-    Exact for simplices with linear shape functions, points included.
-    """
-    corners = parts.shape[1]
-    weights = np.bincount(parts.ravel(), np.repeat(sizes / corners, corners), minlength=total)
-    return weights / sizes.sum()

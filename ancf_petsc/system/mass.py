@@ -1,9 +1,12 @@
 """The mass of the body: one number per pair of nodal vectors that share a cell, constant in time.
 
-Consistent, m_ab = ∫ rho N_a N_b dV by the element's exact rule, or lumped: the row sums on the diagonal.
+Consistent, m_ab = ∫ rho N_a N_b dV by the element's exact rule, or lumped: the diagonal scaled to the
+whole mass, which for linear tetrahedra and bricks are the row sums.
 """
 
 from __future__ import annotations
+
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
@@ -12,35 +15,59 @@ from petsc4py import PETSc
 
 from ancf_petsc.element.element import Element
 from ancf_petsc.kernel.constant import add_mass, mass_product
+from ancf_petsc.kernel.tables import turn_functions
 from ancf_petsc.system.assembly import Assembly
+
+CHUNK = 1000
+"""Cells whose mass matrices are looked at together."""
 
 
 class Mass:
     """The mass matrix of an assembly's owned rows.
 
-    values (nnz,): one number per entry of `assembly.graph`. diagonal (n,). bounds: within which the eigenvalues of the matrix
-    over its diagonal lie, whatever is held: those of one cell (Wathen, IMA J. Numer. Anal. 7 (1987) 449).
+    values (nnz,): one number per entry of `assembly.graph`. diagonal (n,).
     """
 
-    def __init__(self, assembly: Assembly, element: Element, *, lumped: bool = False) -> None:
+    def __init__(self, assembly: Assembly, *, lumped: bool = False) -> None:
         self.assembly = assembly
         self.comm = assembly.comm
         self.lumped = lumped
         model, (pointers, columns) = assembly.model, assembly.graph
-        tables = element.tables("mass")
-        weights = tables.weights / tables.weights.sum()
-        shape = np.einsum("q,qa,qb->ab", weights, tables.values, tables.values)
-        shape = np.diag(shape.sum(axis=1)) if lumped else shape
+        self._slot = model.element.slot.astype(np.int32)
+        self._shape = mean_products(model.element)
         self.values = np.zeros(len(columns))
         for region in model.regions:
             cell_mass = (region.density or 0.0) * model.volumes
-            add_mass(model.cells, cell_mass, shape, region.first, region.last, pointers, columns, self.values)
+            add_mass(
+                model.cells,
+                cell_mass,
+                self._shape,
+                self._slot,
+                model.slope_maps,
+                lumped,
+                region.first,
+                region.last,
+                pointers,
+                columns,
+                self.values,
+            )
         rows = np.repeat(np.arange(model.owned), np.diff(pointers))
         self.diagonal = self.values[columns == rows]
-        scale = 1.0 / np.sqrt(np.diag(shape))
-        eigenvalues = np.linalg.eigvalsh(scale[:, None] * shape * scale)
-        self.bounds = (float(eigenvalues[0]), float(eigenvalues[-1]))
         self._field = np.zeros_like(model.reference)
+
+    @cached_property
+    def bounds(self) -> tuple[float, float]:
+        """Within which the eigenvalues of the matrix over its diagonal lie, whatever is held: those of single cells (Wathen,
+        IMA J. Numer. Anal. 7 (1987) 449). Collective."""
+        maps, row = self.assembly.model.slope_maps, self.assembly.model.element
+        low, high = np.inf, 0.0
+        for chunk in np.array_split(maps, len(maps) // CHUNK + 1) if maps.shape[1] else [maps[:1]]:
+            half = np.stack([turn_functions(shape, chunk, row) for shape in self._shape], axis=1)
+            mass = np.stack([turn_functions(half[:, :, b], chunk, row) for b in range(row.functions)], axis=2)
+            scale = 1.0 / np.sqrt(np.einsum("eaa->ea", mass))
+            values = np.linalg.eigvalsh(scale[:, :, None] * mass * scale[:, None, :])
+            low, high = min(low, values.min(initial=np.inf)), max(high, values.max(initial=0.0))
+        return self.comm.allreduce(low, MPI.MIN), self.comm.allreduce(high, MPI.MAX)
 
     def times(self, field: NDArray, into: NDArray | None = None) -> NDArray[np.float64]:
         """Mass times a field (n, 3) on owned nodal vectors; driven ones are no exception. Collective."""
@@ -59,15 +86,25 @@ class Mass:
     def momenta(self, x: PETSc.Vec, velocity: NDArray) -> tuple[NDArray, NDArray]:
         """Linear and angular momentum (3,), the latter about the origin. Collective."""
         carried = self.times(velocity)
-        linear = carried.sum(axis=0)
+        linear = carried[self.assembly.model.own_positions].sum(axis=0)
         angular = np.cross(x.array_r.reshape(-1, 3), carried).sum(axis=0)
         both = self.comm.allreduce(np.concatenate((linear, angular)), MPI.SUM)
         return both[:3], both[3:]
 
     def centre(self) -> NDArray[np.float64]:
         """Centre of mass (3,) of the undeformed body. Collective."""
-        n = self.assembly.model.owned
-        share = self.times(np.ones((n, 3)))[:, :1]
-        sums = np.concatenate(((share * self.assembly.model.reference[:n]).sum(axis=0), share.sum(axis=0)))
-        total = self.comm.allreduce(sums, MPI.SUM)
-        return total[:3] / total[3]
+        model = self.assembly.model
+        uniform = np.zeros((model.owned, 3))
+        uniform[model.own_positions] = 1.0
+        share = self.times(uniform)[:, 0]
+        moment = share @ model.reference[: model.owned]
+        total = share[model.own_positions].sum()
+        sums = self.comm.allreduce(np.append(moment, total), MPI.SUM)
+        return sums[:3] / sums[3]
+
+
+def mean_products(element: Element) -> NDArray[np.float64]:
+    """Mean of N_a N_b over the reference cell (a, b), exact."""
+    tables = element.tables("mass")
+    weights = tables.weights / tables.weights.sum()
+    return np.einsum("q,qa,qb->ab", weights, tables.values, tables.values)

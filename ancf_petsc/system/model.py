@@ -8,6 +8,10 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from ancf_petsc.element.element import Element
+from ancf_petsc.kernel.mean import MeanKernels
+from ancf_petsc.kernel.tables import turn_functions
+from ancf_petsc.kernel.tet3413 import Kernels
 from ancf_petsc.material import Law
 from ancf_petsc.parallel.exchange import lookup, scatter_rows
 from ancf_petsc.parallel.numbering import Numbering
@@ -20,11 +24,12 @@ from ancf_petsc.system.load import Load
 class Region:
     """Cells first:last of one material; those before own_last are owned by this rank.
 
-    kernels: compiled loops for the element and the law.
+    kernels, mean_kernels: compiled loops for the element and the law; the latter keep energy, where there are such.
     """
 
     law: Law
-    kernels: object
+    kernels: Kernels
+    mean_kernels: MeanKernels | None
     parameters: NDArray[np.float64]
     density: float | None
     first: int
@@ -36,8 +41,9 @@ class Region:
 class Model:
     """What a solver needs to know of the body. v local nodal vectors (owned first), e local cells.
 
-    reference (v, 3): nodal vectors of the undeformed body.
-    tables: arrays of the cells that every kernel takes: cells (e, a), gradients, volumes.
+    reference (v, 3): nodal vectors of the undeformed body. slots (v,): 0 for a position, j for the j-th slope of its node, which
+    follows the position j places behind. Slopes are multiplied by lengths.
+    tables: arrays of the cells that every kernel takes; the first is cells (e, a), the third volumes (e,).
     motion (v, 3): index into motions of driven degrees of freedom, -1 where free.
     size: diagonal of the box around the body.
     cell_numbers: (e,) number of each cell in the mesh file.
@@ -46,12 +52,14 @@ class Model:
     """
 
     comm: MPI.Comm
+    element: Element
     numbering: Numbering
     owned: int
     start: int
     ghost_numbers: NDArray[np.int64]
     reference: NDArray[np.float64]
-    tables: tuple[NDArray, ...]
+    slots: NDArray[np.int8]
+    tables: tuple
     regions: list[Region]
     motion: NDArray[np.int32]
     motions: list[Motion]
@@ -74,7 +82,25 @@ class Model:
     @property
     def dof(self) -> int:
         """Degrees of freedom over all ranks, driven ones included."""
-        return self.comm.allreduce(3 * self.owned)
+        return self.comm.allreduce(self.element.components * self.owned)
+
+    @property
+    def own_positions(self) -> NDArray[np.int64]:
+        """The owned nodal vectors that are positions."""
+        return np.flatnonzero(self.slots[: self.owned] == 0)
+
+    def turned(self, values: NDArray) -> NDArray[np.float64]:
+        """Functions (e, a) of the nodal vectors of all cells from those of the reference cell (a,)."""
+        return turn_functions(values, self.slope_maps, self.element)
+
+    @property
+    def slope_maps(self) -> NDArray[np.float64]:
+        """(e, s, 3, 3) from the slopes of the nodes of each cell to those along xi; no s without slopes."""
+        return self.tables[1].jacobians if self.element.has_slopes else np.empty((len(self.cells), 0, 3, 3))
+
+    def position_cells(self) -> NDArray[np.int32]:
+        """(e, k) the positions of the nodes of each cell."""
+        return self.cells[:, self.element.slot == 0]
 
     def driven_bits(self) -> NDArray[np.uint8]:
         """(v,) bit i is set where component i of the nodal vector is driven."""

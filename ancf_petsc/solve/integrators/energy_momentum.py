@@ -26,12 +26,12 @@ class EnergyMomentum(OneStep):
 
     def __init__(self, equations: Equations, settings: Settings, x: PETSc.Vec, v: PETSc.Vec) -> None:
         for region in equations.assembly.model.regions:
-            if region.law.mean_stress is None:
+            if region.mean_kernels is None:
                 raise CaseError(
-                    f"the law {region.law.name} has no discrete gradient",
+                    f"element {equations.assembly.model.element.code} with the law {region.law.name} has no discrete gradient",
                     key="dynamics.integrator",
                     got=self.name,
-                    expected="a law with mean_stress and mean_tangent",
+                    expected="a solid or plane element and a law with mean_stress and mean_tangent",
                     cure="take generalized_alpha",
                 )
         super().__init__(equations, settings, x, v)

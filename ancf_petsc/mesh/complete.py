@@ -1,0 +1,100 @@
+"""Nodes an element has and its mesh lacks: middles of edges and centres of faces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ancf_petsc.element.element import Element
+from ancf_petsc.mesh.kinds import KINDS
+from ancf_petsc.mesh.mesh import Group, Integers, Mesh
+from ancf_petsc.mesh.parts import row_keys, rows_in, unique_rows
+
+MOVED = 1e-12
+"""Mid-nodes closer to the middle of their edge than this times the mesh size stay where they are."""
+
+
+def complete(mesh: Mesh, element: Element) -> None:
+    """Give every cell all nodes of the element, corners first, and enter new nodes into the groups.
+
+    Nodes the mesh has are moved to the mean of their corners. `mesh.kind` is the kind of the corners afterwards.
+    """
+    cells = mesh.cells
+    mesh.kind = KINDS[mesh.kind].linear or mesh.kind
+    if cells.shape[1] > KINDS[mesh.kind].nodes:
+        _straighten(mesh, element)
+        return
+    by_corners: dict[int, list[tuple[int, ...]]] = {}
+    for node in element.nodes:
+        by_corners.setdefault(len(node.corners), []).append(node.corners)
+    for size, places in sorted(by_corners.items()):
+        if size > 1:
+            _add_nodes(mesh, cells, np.array(places))
+
+
+def _straighten(mesh: Mesh, element: Element) -> None:
+    """Move mid-nodes onto the middle of their edge."""
+    largest, count = 0.0, 0
+    for place, node in enumerate(element.nodes):
+        if len(node.corners) == 1:
+            continue
+        nodes = mesh.cells[:, place]
+        middle = mesh.points[mesh.cells[:, node.corners]].mean(axis=1)
+        off = np.linalg.norm(mesh.points[nodes] - middle, axis=1)
+        moved = off > MOVED * mesh.size
+        largest, count = max(largest, off.max()), count + len(np.unique(nodes[moved]))
+        mesh.points[nodes[moved]] = middle[moved]
+    if count:
+        mesh.notes.append(
+            f"{count} mid-nodes lay off the middle of their edge, by up to {largest:.3g}: moved onto it"
+        )
+
+
+def _add_nodes(mesh: Mesh, cells: Integers, places: Integers) -> None:
+    """A node at the mean of every edge or face: places (k, corners) of each cell."""
+    every = cells[:, places].reshape(-1, places.shape[1])
+    _, first, which = np.unique(row_keys(every, len(mesh.points)), return_index=True, return_inverse=True)
+    corners = every[first]
+    old, highest = len(mesh.points), mesh.node_numbers.max()
+    new = old + np.arange(len(corners))
+    groups = {name: _with_new_nodes(mesh, group, corners, new) for name, group in mesh.groups.items()}
+    mesh.points = np.concatenate((mesh.points, mesh.points[corners].mean(axis=1)))
+    mesh.node_numbers = np.concatenate((mesh.node_numbers, highest + 1 + np.arange(len(corners))))
+    mesh.used = np.concatenate((mesh.used, np.ones(len(corners), bool)))
+    mesh.cells = np.hstack((mesh.cells, new[which].reshape(len(cells), -1)))
+    mesh.groups = groups
+    what = {2: "middles of edges"}.get(places.shape[1], "centres of faces")
+    mesh.notes.append(
+        f"{len(corners)} nodes added at {what}, numbered from {highest + 1}: the element has them, the mesh file not"
+    )
+
+
+def _with_new_nodes(mesh: Mesh, group: Group, corners: Integers, new: Integers) -> Group:
+    """A group with the new nodes (m,) whose corners (m, k) are those of one of its parts, or all in a set of nodes."""
+    inside = np.zeros(len(mesh.points), bool)
+    inside[group.nodes] = True
+    candidates = np.flatnonzero(inside[corners].all(axis=1))
+    if group.parts:
+        wanted = [
+            rows
+            for dimension, parts in group.parts.items()
+            if len(rows := _faces_of(parts, dimension, corners.shape[1]))
+        ]
+        bound = len(mesh.points)
+        known = (
+            unique_rows(np.concatenate(wanted), bound)
+            if wanted
+            else np.empty((0, corners.shape[1]), np.int64)
+        )
+        candidates = candidates[rows_in(corners[candidates], known, bound) >= 0]
+    return Group(group.name, np.concatenate((group.nodes, new[candidates])), group.parts)
+
+
+def _faces_of(parts: Integers, dimension: int, corners: int) -> Integers:
+    """Edges or faces (m, corners) of parts of a dimension."""
+    kind = next(
+        k for k in KINDS.values() if (k.dimension, k.nodes) == (dimension, parts.shape[1]) and not k.linear
+    )
+    if kind.nodes == corners:
+        return parts
+    places = {2: kind.edges}.get(corners, kind.sides if dimension == 3 else ())
+    return parts[:, np.array(places)].reshape(-1, corners) if places else parts[:0, :0]
