@@ -1,7 +1,7 @@
 """The fast path of element 3413: one integration point, constant gradients, everything in registers.
 
-A claim of equality with the generic kernel, which a test checks. Cells are tetrahedra with nodes 0 to 3. F = sum_a r_a G_a
-with the gradients G of nodes 1 to 3; that of node 0 is minus their sum.
+A claim of equality with the generic kernel, which a test checks. Cells are tetrahedra with nodes 0 to 3. F
+= sum_a r_a G_a with the gradients G of nodes 1 to 3; that of node 0 is minus their sum.
 
 Arrays, v nodal vectors and e cells of this rank:
     positions (v, 3)      current positions
@@ -14,6 +14,7 @@ Arrays, v nodal vectors and e cells of this rank:
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
@@ -21,20 +22,29 @@ from numba.extending import register_jitable
 
 from ancf_petsc.kernel.compiled import kernel
 from ancf_petsc.material.models import Law, green_lagrange
-from ancf_petsc.material.tensor import add, apply, determinant, dot, inverse_transpose, scale, transpose
+from ancf_petsc.material.tensor import (
+    add,
+    apply,
+    determinant,
+    dot,
+    inlined,
+    inverse_transpose,
+    scale,
+    transpose,
+)
 
 
 class Kernels(NamedTuple):
     """The compiled loops of one element and one law."""
 
-    internal_force: object
-    energy: object
-    tangent: object
-    tangent_product: object
-    fields: object
+    internal_force: Callable
+    energy: Callable
+    tangent: Callable
+    tangent_product: Callable
+    fields: Callable
 
 
-@register_jitable
+@inlined
 def edge_sum(r, nodes, G):
     """sum over a = 1..3 of (r_a - r_0) G_a as nine numbers."""
     x, y, z = r[nodes[0], 0], r[nodes[0], 1], r[nodes[0], 2]
@@ -48,7 +58,7 @@ def edge_sum(r, nodes, G):
     return total
 
 
-@register_jitable
+@inlined
 def scatter_force(force, nodes, P, volume, G):
     """Add volume P G_a to the force of node a, and what balances it to node 0."""
     fx = fy = fz = 0.0
@@ -66,6 +76,41 @@ def scatter_force(force, nodes, P, volume, G):
     force[nodes[0], 2] -= fz
 
 
+@inlined
+def add_rows(values, start, stride, block):
+    """Add a 3 x 3 block to a matrix stored by rows of length `stride`, from `start` on."""
+    for i in range(3):
+        row = start + i * stride
+        values[row] += block[3 * i]
+        values[row + 1] += block[3 * i + 1]
+        values[row + 2] += block[3 * i + 2]
+
+
+@inlined
+def add_inner_cell(values, starts, strides, nodes, upper):
+    """Add a cell none of whose rows and columns is driven or another rank's. upper: blocks (a, b) with a <=
+    b.
+    """
+    s0, s1, s2, s3 = strides[nodes[0], 0], strides[nodes[1], 0], strides[nodes[2], 0], strides[nodes[3], 0]
+    k00, k01, k02, k03, k11, k12, k13, k22, k23, k33 = upper
+    add_rows(values, starts[0, 0], s0, k00)
+    add_rows(values, starts[0, 1], s0, k01)
+    add_rows(values, starts[0, 2], s0, k02)
+    add_rows(values, starts[0, 3], s0, k03)
+    add_rows(values, starts[1, 0], s1, transpose(k01))
+    add_rows(values, starts[1, 1], s1, k11)
+    add_rows(values, starts[1, 2], s1, k12)
+    add_rows(values, starts[1, 3], s1, k13)
+    add_rows(values, starts[2, 0], s2, transpose(k02))
+    add_rows(values, starts[2, 1], s2, transpose(k12))
+    add_rows(values, starts[2, 2], s2, k22)
+    add_rows(values, starts[2, 3], s2, k23)
+    add_rows(values, starts[3, 0], s3, transpose(k03))
+    add_rows(values, starts[3, 1], s3, transpose(k13))
+    add_rows(values, starts[3, 2], s3, transpose(k23))
+    add_rows(values, starts[3, 3], s3, k33)
+
+
 @register_jitable
 def add_block(values, start, stride, block, driven_row, driven_column):
     """Add a 3 x 3 block to a matrix stored by rows, leaving out driven rows and columns.
@@ -74,22 +119,43 @@ def add_block(values, start, stride, block, driven_row, driven_column):
     """
     if start < 0:
         return
-    if driven_row | driven_column == 0:
-        for i in range(3):
-            for j in range(3):
+    for i in range(3):
+        for j in range(3):
+            if not (driven_row >> i | driven_column >> j) & 1:
                 values[start + i * stride + j] += block[3 * i + j]
-    else:
-        for i in range(3):
-            if not driven_row >> i & 1:
-                for j in range(3):
-                    if not driven_column >> j & 1:
-                        values[start + i * stride + j] += block[3 * i + j]
+
+
+@register_jitable
+def add_any_cell(values, starts, strides, split, driven, nodes, upper):
+    """Add a cell with driven degrees of freedom or nodes of other ranks. upper: blocks (a, b) with a <= b."""
+    k = 0
+    for a in range(4):
+        i = nodes[a]
+        for b in range(a, 4):
+            j = nodes[b]
+            start = starts[a, b]
+            add_block(values, start, strides[i, 1 if start >= split else 0], upper[k], driven[i], driven[j])
+            if a != b:
+                start = starts[b, a]
+                stride = strides[j, 1 if start >= split else 0]
+                add_block(values, start, stride, transpose(upper[k]), driven[j], driven[i])
+            k += 1
 
 
 @cache
 def make_kernels(law: Law) -> Kernels:
     """Kernels of element 3413 for one law."""
-    psi, stress, block_of = law.energy, law.stress, law.tangent
+    return Kernels(
+        internal_force=force_kernel(law.stress),
+        energy=energy_kernel(law.energy),
+        tangent=tangent_kernel(law.tangent),
+        tangent_product=tangent_product_kernel(law.tangent),
+        fields=fields_kernel(law.stress),
+    )
+
+
+def force_kernel(stress: Callable) -> Callable:
+    """The loop over internal forces."""
 
     @kernel
     def internal_force(positions, cells, gradients, volumes, parameters, first, last, force):
@@ -102,6 +168,12 @@ def make_kernels(law: Law) -> Kernels:
             scatter_force(force, nodes, stress(F, parameters), volumes[e], G)
         return smallest
 
+    return internal_force
+
+
+def energy_kernel(psi: Callable) -> Callable:
+    """The loop over strain energies."""
+
     @kernel
     def energy(positions, cells, gradients, volumes, parameters, first, last):
         """Strain energy of the cells."""
@@ -109,6 +181,12 @@ def make_kernels(law: Law) -> Kernels:
         for e in range(first, last):
             total += volumes[e] * psi(edge_sum(positions, cells[e], gradients[e]), parameters)
         return total
+
+    return energy
+
+
+def tangent_kernel(block_of: Callable) -> Callable:
+    """The loop over tangents."""
 
     @kernel
     def tangent(
@@ -119,7 +197,8 @@ def make_kernels(law: Law) -> Kernels:
         starts (e, 4, 4): where block (a, b) begins in values; negative for rows of other ranks.
         strides (v, 2): length of a scalar row of the nodal vector in the two parts of values.
         split: where the second part (columns of other ranks) begins in values.
-        driven (v,): bit i is set where component i is driven: its row and column stay out.
+        driven (v,): bit i is set where component i is driven: its row and column stay out; bit 3 where
+        another rank owns the nodal vector.
         """
         for e in range(first, last):
             nodes, G, w = cells[e], gradients[e], volumes[e]
@@ -133,22 +212,22 @@ def make_kernels(law: Law) -> Kernels:
             k22 = scale(w, block_of(F, g2, g2, parameters))
             k23 = scale(w, block_of(F, g2, g3, parameters))
             k33 = scale(w, block_of(F, g3, g3, parameters))
-            k21, k31, k32 = transpose(k12), transpose(k13), transpose(k23)
-            k01 = scale(-1.0, add(k11, add(k21, k31)))
-            k02 = scale(-1.0, add(k12, add(k22, k32)))
+            k01 = scale(-1.0, add(k11, add(transpose(k12), transpose(k13))))
+            k02 = scale(-1.0, add(k12, add(k22, transpose(k23))))
             k03 = scale(-1.0, add(k13, add(k23, k33)))
             k00 = scale(-1.0, add(k01, add(k02, k03)))
-            blocks = (
-                (k00, k01, k02, k03),
-                (transpose(k01), k11, k12, k13),
-                (transpose(k02), k21, k22, k23),
-                (transpose(k03), k31, k32, k33),
-            )
-            for a in range(4):
-                for b in range(4):
-                    start = starts[e, a, b]
-                    stride = strides[nodes[a], 1 if start >= split else 0]
-                    add_block(values, start, stride, blocks[a][b], driven[nodes[a]], driven[nodes[b]])
+            upper = (k00, k01, k02, k03, k11, k12, k13, k22, k23, k33)
+            held = driven[nodes[0]] | driven[nodes[1]] | driven[nodes[2]] | driven[nodes[3]]
+            if held == 0:
+                add_inner_cell(values, starts[e], strides, nodes, upper)
+            else:
+                add_any_cell(values, starts[e], strides, split, driven, nodes, upper)
+
+    return tangent
+
+
+def tangent_product_kernel(block_of: Callable) -> Callable:
+    """The loop over directional derivatives of the forces."""
 
     @kernel
     def tangent_product(positions, direction, cells, gradients, volumes, parameters, first, last, force):
@@ -179,6 +258,12 @@ def make_kernels(law: Law) -> Kernels:
                     )
             scatter_force(force, nodes, dP, volumes[e], G)
 
+    return tangent_product
+
+
+def fields_kernel(stress: Callable) -> Callable:
+    """The loop over strains and stresses."""
+
     @kernel
     def fields(positions, cells, gradients, volumes, parameters, first, last, strain, cauchy, det):
         """Green-Lagrange strain (e, 9), Cauchy stress (e, 9) and det F (e,) of the cells."""
@@ -192,7 +277,7 @@ def make_kernels(law: Law) -> Kernels:
                 cauchy[e, k] = sigma[k]
             det[e] = J
 
-    return Kernels(internal_force, energy, tangent, tangent_product, fields)
+    return fields
 
 
 @kernel

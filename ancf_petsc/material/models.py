@@ -4,18 +4,20 @@
     P   = stress(F, p)             P = dpsi/dF
     K   = tangent(F, u, v, p)      K_ik = A_iJkL u_J v_L with A = dP/dF
 
-F, P and K are tuples of nine numbers, row by row; u and v are material vectors (tuples of three); p is the array of the law's
-parameters. The tangent is given as the block it makes between two shape functions with gradients u and v: unit vectors for u
-and v give all of A. `parameters` makes p of Young's modulus and Poisson's ratio.
+F, P and K are tuples of nine numbers, row by row; u and v are material vectors (tuples of three); p is the
+array of the law's parameters. The tangent is given as the block it makes between two shape functions with
+gradients u and v: unit vectors for u and v give all of A. `parameters` makes p of Young's modulus and
+Poisson's ratio.
 
 For steps that keep energy a law may have a discrete gradient between two states, with F = (F0 + F1) / 2:
 
     P = mean_stress(F0, F1, p)         P = F S, S symmetric, S : (E1 - E0) = psi(F1) - psi(F0)
     K = mean_tangent(F0, F1, u, v, p)  as `tangent`, with A = dP/dF1
 
-Sources: Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed. (2008), sections 6.4 and 6.5;
-Gonzalez, Exact energy and momentum conserving algorithms for general models in nonlinear elasticity, CMAME 190 (2000) 1763;
-the first law is the one of Olshevskiy et al. (2017), Eqs. (7)-(9), with the misprint of (9) mended (docs/theory.md).
+Sources: Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed. (2008), sections
+6.4 and 6.5; Gonzalez, Exact energy and momentum conserving algorithms for general models in nonlinear
+elasticity, CMAME 190 (2000) 1763; the first law is the one of Olshevskiy et al. (2017), Eqs. (7)-(9), with
+the misprint of (9) mended (docs/theory.md).
 """
 
 from __future__ import annotations
@@ -25,7 +27,6 @@ from math import log, log1p
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from ancf_petsc.errors import CaseError, did_you_mean
@@ -37,6 +38,7 @@ from ancf_petsc.material.tensor import (
     determinant,
     dot,
     gram,
+    inlined,
     inner,
     inverse_transpose,
     outer,
@@ -75,7 +77,7 @@ def plane_stress(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
 # --- St Venant-Kirchhoff: S = lambda tr(E) I + 2 mu E, E = (FᵀF - I) / 2
 
 
-@register_jitable
+@inlined
 def green_lagrange(F):
     """Green-Lagrange strain (FᵀF - I) / 2."""
     c = gram(F)
@@ -92,24 +94,24 @@ def green_lagrange(F):
     )
 
 
-@register_jitable
+@inlined
 def svk_second_stress(E, p):
     """Second Piola-Kirchhoff stress from the Green-Lagrange strain."""
     return add(scale(p[0] * trace(E), IDENTITY), scale(2.0 * p[1], E))
 
 
-@register_jitable
+@inlined
 def svk_energy(F, p):
     E = green_lagrange(F)
     return 0.5 * p[0] * trace(E) ** 2 + p[1] * contract(E, E)
 
 
-@register_jitable
+@inlined
 def svk_stress(F, p):
     return dot(F, svk_second_stress(green_lagrange(F), p))
 
 
-@register_jitable
+@inlined
 def svk_tangent(F, u, v, p):
     S = svk_second_stress(green_lagrange(F), p)
     Fu, Fv = apply(F, u), apply(F, v)
@@ -118,19 +120,19 @@ def svk_tangent(F, u, v, p):
     return add(material, along)
 
 
-@register_jitable
+@inlined
 def middle(A, B):
     """(A + B) / 2."""
     return scale(0.5, add(A, B))
 
 
-@register_jitable
+@inlined
 def svk_mean_stress(F0, F1, p):
     S = svk_second_stress(middle(green_lagrange(F0), green_lagrange(F1)), p)
     return dot(middle(F0, F1), S)
 
 
-@register_jitable
+@inlined
 def svk_mean_tangent(F0, F1, u, v, p):
     F = middle(F0, F1)
     S = svk_second_stress(middle(green_lagrange(F0), green_lagrange(F1)), p)
@@ -143,7 +145,7 @@ def svk_mean_tangent(F0, F1, u, v, p):
 # --- compressible neo-Hooke: psi = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2
 
 
-@register_jitable
+@inlined
 def neo_hooke_energy(F, p):
     if determinant(F) <= 0.0:
         return np.inf
@@ -152,7 +154,7 @@ def neo_hooke_energy(F, p):
     return p[1] * (trace(E) - log_J) + 0.5 * p[0] * log_J**2
 
 
-@register_jitable
+@inlined
 def log_det(E):
     """ln J from the Green-Lagrange strain: small strains lose no digits, as the discrete gradient needs."""
     linear = trace(E)
@@ -160,14 +162,14 @@ def log_det(E):
     return 0.5 * log1p(2.0 * linear + 4.0 * quadratic + 8.0 * determinant(E))
 
 
-@register_jitable
+@inlined
 def neo_hooke_stress(F, p):
     J = determinant(F)
     log_J = log(J) if J > 0.0 else np.nan
     return add(scale(p[1], F), scale(p[0] * log_J - p[1], inverse_transpose(F, J)))
 
 
-@register_jitable
+@inlined
 def neo_hooke_tangent(F, u, v, p):
     J = determinant(F)
     log_J = log(J) if J > 0.0 else np.nan
@@ -177,7 +179,7 @@ def neo_hooke_tangent(F, u, v, p):
     return add(volumetric, scale(p[1] * inner(u, v), IDENTITY))
 
 
-@register_jitable
+@inlined
 def neo_hooke_second_stress(C, p):
     """S and C^-1 from C = FᵀF."""
     inverse = inverse_transpose(C, determinant(C))
@@ -185,9 +187,11 @@ def neo_hooke_second_stress(C, p):
     return add(scale(p[1], IDENTITY), scale(p[0] * log_J - p[1], inverse)), inverse, log_J
 
 
-@register_jitable
+@inlined
 def neo_hooke_correction(F0, F1, S, p):
-    """N = E1 - E0, N : N and the factor of N that makes S a discrete gradient; 0 where the states are the same."""
+    """N = E1 - E0, N : N and the factor of N that makes S a discrete gradient; 0 where the states are the
+    same.
+    """
     N = add(green_lagrange(F1), scale(-1.0, green_lagrange(F0)))
     length = contract(N, N)
     if length < SAME_STRAIN**2:
@@ -196,14 +200,14 @@ def neo_hooke_correction(F0, F1, S, p):
     return N, length, (rise - contract(S, N)) / length
 
 
-@register_jitable
+@inlined
 def neo_hooke_mean_stress(F0, F1, p):
     S, _, _ = neo_hooke_second_stress(middle(gram(F0), gram(F1)), p)
     N, _, factor = neo_hooke_correction(F0, F1, S, p)
     return dot(middle(F0, F1), add(S, scale(factor, N)))
 
 
-@register_jitable
+@inlined
 def neo_hooke_mean_tangent(F0, F1, u, v, p):
     F = middle(F0, F1)
     S, inverse, log_J = neo_hooke_second_stress(middle(gram(F0), gram(F1)), p)
@@ -219,7 +223,7 @@ def neo_hooke_mean_tangent(F0, F1, u, v, p):
     return add(material, scale(geometric, IDENTITY))
 
 
-@register_jitable
+@inlined
 def neo_hooke_mean_growth(w, v, parts, p):
     """Change of the mean S when row w of F1 grows along v."""
     inverse, log_J, pull, N, length, factor = parts

@@ -1,22 +1,24 @@
 """Second-order tensors as tuples of nine numbers, row by row, and vectors as tuples of three.
 
-Tuples live in registers: inside compiled kernels these functions inline to plain arithmetic without any memory traffic.
-All are `register_jitable`: Python functions here, compiled where a kernel calls them, and safe for numba's cache.
+Tuples live in registers: inside compiled kernels these functions become plain arithmetic without memory
+traffic. All are `inlined`: Python functions here, compiled into the kernel that calls them, and safe for
+numba's cache.
 """
 
 from __future__ import annotations
 
 from numba.extending import register_jitable
 
+inlined = register_jitable(forceinline=True)
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
-@register_jitable
+@inlined
 def trace(a):
     return a[0] + a[4] + a[8]
 
 
-@register_jitable
+@inlined
 def determinant(a):
     return (
         a[0] * (a[4] * a[8] - a[5] * a[7])
@@ -25,7 +27,7 @@ def determinant(a):
     )
 
 
-@register_jitable
+@inlined
 def inverse_transpose(a, det):
     """Cofactors of a over its determinant."""
     r = 1.0 / det
@@ -42,7 +44,7 @@ def inverse_transpose(a, det):
     )
 
 
-@register_jitable
+@inlined
 def add(a, b):
     return (
         a[0] + b[0],
@@ -57,12 +59,12 @@ def add(a, b):
     )
 
 
-@register_jitable
+@inlined
 def scale(s, a):
     return (s * a[0], s * a[1], s * a[2], s * a[3], s * a[4], s * a[5], s * a[6], s * a[7], s * a[8])
 
 
-@register_jitable
+@inlined
 def contract(a, b):
     """a : b, the sum of products of components."""
     return (
@@ -78,12 +80,12 @@ def contract(a, b):
     )
 
 
-@register_jitable
+@inlined
 def transpose(a):
     return (a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8])
 
 
-@register_jitable
+@inlined
 def dot(a, b):
     """Product a b."""
     return (
@@ -99,7 +101,7 @@ def dot(a, b):
     )
 
 
-@register_jitable
+@inlined
 def gram(a):
     """aᵀ a, symmetric."""
     xx = a[0] * a[0] + a[3] * a[3] + a[6] * a[6]
@@ -111,7 +113,7 @@ def gram(a):
     return (xx, xy, zx, xy, yy, yz, zx, yz, zz)
 
 
-@register_jitable
+@inlined
 def apply(a, v):
     """a v."""
     return (
@@ -121,12 +123,12 @@ def apply(a, v):
     )
 
 
-@register_jitable
+@inlined
 def inner(u, v):
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
-@register_jitable
+@inlined
 def outer(u, v):
     return (
         u[0] * v[0],

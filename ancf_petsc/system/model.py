@@ -103,8 +103,10 @@ class Model:
         return self.cells[:, self.element.slot == 0]
 
     def driven_bits(self) -> NDArray[np.uint8]:
-        """(v,) bit i is set where component i of the nodal vector is driven."""
-        return ((self.motion >= 0) << np.arange(3)).sum(axis=1).astype(np.uint8)
+        """(v,) bit i is set where component i of the nodal vector is driven, bit 3 where another rank owns it."""
+        bits = ((self.motion >= 0) << np.arange(3)).sum(axis=1).astype(np.uint8)
+        bits[self.owned :] |= 8
+        return bits
 
 
 def local_rows(numbering: Numbering, table: NDArray | None, total: int) -> NDArray:
