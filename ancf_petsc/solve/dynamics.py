@@ -69,7 +69,8 @@ class TimeIntegration:
         try:
             step = integrator.advance(goal)
             if not isfinite(integrator.x.norm() + integrator.v.norm(PETSc.NormType.INFINITY) ** 2):
-                raise integrator.failed(goal, "numbers are not finite any more")
+                reached, integrator.time = integrator.time, start
+                raise integrator.failed(reached, "numbers are not finite any more")
         except MotionStopped:
             integrator.time, integrator.a = start, carried
             for kept, now in zip(self._before, (integrator.x, integrator.v), strict=True):

@@ -21,14 +21,14 @@ ACCURACY = 1e-13
 
 
 class MassSolver:
-    """Solves M a = b on the free degrees of freedom; driven ones get 0."""
+    """Solves M a = b on the free degrees of freedom; driven ones get 0. way: inverse, cholesky, chebyshev; None chooses."""
 
-    def __init__(self, mass: Mass) -> None:
+    def __init__(self, mass: Mass, way: str | None = None) -> None:
         self.mass = mass
         model = mass.assembly.model
         self.free = model.motion[: model.owned] < 0
-        small = mass.comm.size == 1 and model.owned <= LARGEST_TO_FACTOR
-        self._factors = self._factor() if small and not mass.lumped else []
+        way = way or self._choose()
+        self._factors = [] if way == "chebyshev" else self._factor(_Inverse if way == "inverse" else _Factor)
         root = sqrt(mass.bounds[1] / mass.bounds[0])
         self._iterations = 1 if mass.lumped else ceil(log(ACCURACY / 2) / log((root - 1) / (root + 1)))
 
@@ -48,7 +48,13 @@ class MassSolver:
         for factor in self._factors:
             factor.destroy()
 
-    def _factor(self) -> list[_Inverse] | list[_Factor]:
+    def _choose(self) -> str:
+        nodes = self.mass.assembly.model.owned
+        if self.mass.comm.size > 1 or self.mass.lumped or nodes > LARGEST_TO_FACTOR:
+            return "chebyshev"
+        return "inverse" if nodes <= LARGEST_TO_INVERT else "cholesky"
+
+    def _factor(self, kind: type[_Inverse] | type[_Factor]) -> list[_Inverse | _Factor]:
         pointers, columns = self.mass.assembly.graph
         n = len(self.free)
         matrix = csr_array((self.mass.values, columns, pointers), shape=(n, n))
@@ -56,7 +62,6 @@ class MassSolver:
         for axis in range(3):
             sets.setdefault(self.free[:, axis].tobytes(), []).append(axis)
         rows = {key: np.flatnonzero(np.frombuffer(key, bool)) for key in sets}
-        kind = _Inverse if n <= LARGEST_TO_INVERT else _Factor
         return [kind(matrix[rows[key]][:, rows[key]], rows[key], axes, n) for key, axes in sets.items()]
 
     def _chebyshev(self, b: NDArray) -> NDArray:

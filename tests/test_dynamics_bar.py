@@ -1,0 +1,42 @@
+"""The bar of section 5.1: damped to rest it is where statics says, and every joule is accounted for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from motion_cases import PROJECT, REFERENCE
+
+from ancf_petsc import load_case
+from ancf_petsc.case.run import run_case
+from ancf_petsc.results.tables import read_table
+
+BAR = PROJECT / "cases" / "bar_tension"
+WEIGHT = 0.5 * 0.1 * 0.1 * 7800.0 * 9.81
+
+
+def reference(gravity: int) -> np.ndarray:
+    rows = np.genfromtxt(REFERENCE / "bar_tension.csv", delimiter=",", names=True)
+    return rows[(rows["elements"] == 240) & (rows["nx"] == 2) & (rows["gravity"] == gravity)][0]
+
+
+@pytest.mark.parametrize(("case", "gravity"), [("case.toml", 1), ("without_gravity.toml", 0)])
+def test_damped_motion_ends_at_the_static_answer(case, gravity, tmp_path):
+    """Within 1e-5 after 5 s of critical damping (what is left of the motion); balance 1e-6 of the work (exact, in fact)."""
+    run_case(load_case(BAR / case), tmp_path / "run")
+    probes, curve = (read_table(tmp_path / "run" / f"{name}.csv") for name in ("probes", "curve"))
+    expected = reference(gravity)
+    assert probes["middle.uz"][-1] == pytest.approx(expected["mid_m"], rel=1e-5)
+    assert probes["end.uz"][-1] == pytest.approx(expected["end_m"], rel=1e-5)
+    assert np.abs(curve["energy_drift"]).max() < 1e-6 * curve["external_work"][-1]
+    assert curve["top.rz"][-1] == pytest.approx(120.0 + gravity * WEIGHT, rel=1e-5)
+    if gravity:
+        assert "alpha = 4 pi / T = 14.4769" in (tmp_path / "run" / "log.txt").read_text()
+
+
+@pytest.mark.parametrize(("case", "gravity"), [("statics.toml", 1), ("statics_without_gravity.toml", 0)])
+def test_statics(case, gravity, tmp_path):
+    """To the 10 digits the reference has."""
+    run_case(load_case(BAR / case), tmp_path / "run")
+    probes, expected = read_table(tmp_path / "run" / "probes.csv"), reference(gravity)
+    assert probes["middle.uz"][-1] == pytest.approx(expected["mid_m"], abs=1e-10)
+    assert probes["end.uz"][-1] == pytest.approx(expected["end_m"], abs=1e-10)
