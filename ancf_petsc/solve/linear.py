@@ -2,7 +2,8 @@
 
 Up to DIRECT_LIMIT degrees of freedom MUMPS factors the symmetric tangent (LDLᵀ: it may be indefinite, and its
 negative pivots are counted). Above, conjugate gradients: with incomplete factors up to MULTIGRID_LIMIT, then with
-algebraic multigrid that knows the rigid motions of the current configuration. The preconditioner is kept from one
+algebraic multigrid that knows the rigid motions of the current configuration. Elements with slopes or mid-nodes have long
+rows, on which incomplete factors do little: up to CURVED_LIMIT they are factored, then multigrid takes over. The preconditioner is kept from one
 tangent to the next while it pays. In motion the mass keeps the matrix definite: PETSc's own factorisation, which has
 less to set up, serves small bodies.
 """
@@ -20,6 +21,7 @@ from ancf_petsc.system.rigid import rigid_motions
 DIRECT_LIMIT = 3_000
 MULTIGRID_LIMIT = 120_000
 SMALL = 3_000
+CURVED_LIMIT = 30_000
 TIRED = 1.5
 
 
@@ -35,7 +37,8 @@ class LinearSolver:
         self.symmetric = symmetric
         self.small = moving and assembly.comm.size == 1 and self.dof <= SMALL
         chosen = is_given("ksp_type") or is_given("pc_type")
-        self.direct = self.dof <= DIRECT_LIMIT and not chosen
+        self.curved = assembly.model.element.is_curved
+        self.direct = self.dof <= (CURVED_LIMIT if self.curved else DIRECT_LIMIT) and not chosen
         self._fresh_rate: float | None = None
         self._rate: float | None = None
         self._configure()
@@ -53,7 +56,7 @@ class LinearSolver:
         self.ksp.setTolerances(rtol=1e-8, max_it=1000)
         if self.symmetric:
             self.ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
-        if self.dof > MULTIGRID_LIMIT or not self.symmetric:
+        if self.curved or self.dof > MULTIGRID_LIMIT or not self.symmetric:
             pc.setType(PETSc.PC.Type.GAMG)
             pc.setGAMGType("agg")
             pc.setGAMGSmooths(1)
