@@ -1,7 +1,8 @@
 """How exactly each linear system of Newton's method is solved.
 
 After a linear solve that reduces its residual by eta the next out-of-balance force is about eta r + C r^2. Solving far
-better than C r is wasted, and so is going beyond the tolerance. C is learnt from the iterations so far.
+better than C r is wasted, and so is going beyond the tolerance. C is learnt from the iterations so far. A new tangent
+costs as much as several iterations of the linear solver, so eta stays well below C r: SHARE of it.
 
 After Eisenstat and Walker, Choosing the forcing terms in an inexact Newton method, SIAM J. Sci. Comput. 17 (1996) 16.
 """
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 LOOSEST, TIGHTEST = 0.1, 1e-10
 AIM = 0.3
+SHARE = 0.01
 
 
 class Forcing:
@@ -34,7 +36,7 @@ class Forcing:
 
     def term(self, residual: float) -> float:
         """The reduction to ask for at an out-of-balance force `residual`."""
-        wanted = max(self._curvature * residual, AIM * self.tolerance / residual)
+        wanted = max(SHARE * self._curvature * residual, AIM * self.tolerance / residual)
         eta = min(max(wanted, TIGHTEST), LOOSEST)
         self._last = (residual, eta)
         return eta

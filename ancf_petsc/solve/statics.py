@@ -1,7 +1,7 @@
 """Quasi-static load paths: equilibrium after equilibrium in pseudo-time s from 0 to exactly 1.
 
-Predictor: the tangent for the first steps and after corners of a ramp, quadratic extrapolation of the last states after. A
-step that fails is halved, one that converges quickly lets the next grow; outputs and corners are hit exactly.
+Predictor: the tangent for the first steps and after corners of a ramp, then extrapolation of the last states. A step
+that fails is halved, one that converges quickly lets the next grow; outputs and corners are hit exactly.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from ancf_petsc.solve.stability import why_it_ends
 
 LONGEST_FIRST_STEP = 0.1
 QUICK, SLOW = 5, 9
+MOST_STATES = 4
 log = logging.getLogger("ancf")
 
 
@@ -111,7 +112,7 @@ class LoadPath:
         return trial, outcome
 
     def _extrapolated(self, target: float) -> PETSc.Vec | None:
-        """The parabola through the last three states, None while there are fewer or where it turns cells inside out."""
+        """The polynomial through the last states, three at least; None where it turns cells inside out."""
         if len(self._history) < 3:
             return None
         trial = self.x.copy()
@@ -138,7 +139,7 @@ class LoadPath:
                 state.destroy()
             self._history = []
         self._history.append((s, x.copy()))
-        if len(self._history) > 3:
+        if len(self._history) > MOST_STATES:
             self._history.pop(0)[1].destroy()
 
     def _adapt(self, step: Step) -> None:
