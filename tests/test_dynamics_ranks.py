@@ -14,7 +14,7 @@ sys.path.insert(0, sys.argv[1])
 from motion_cases import Followed, pendulum
 comm, found = MPI.COMM_WORLD, {}
 for name, step in json.loads(sys.argv[2]).items():
-    how = {"duration": 0.1, "outputs": 2, "integrator": name, "step": step, "damping": 0.5}
+    how = {"duration": 10 * step, "outputs": 2, "integrator": name, "step": step, "damping": 0.5}
     data = pendulum(how, constraint=[{"group": "hinge", "fix": ["x", "y"], "move": {"z": 0.02}}])
     followed = Followed(data, comm=comm)
     model = followed.motion.assembly.model

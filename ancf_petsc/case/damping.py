@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import logging
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import pi, sqrt
 
 from petsc4py import PETSc
@@ -18,11 +17,18 @@ from ancf_petsc.system.mass import Mass
 from ancf_petsc.system.ramp import Ramp
 
 STATIC_TOLERANCE, SMALLEST_STEP = 1e-9, 1e-3
-log = logging.getLogger("ancf")
 
 
-def damping_of(case: Case, assembly: Assembly, mass: Mass) -> float:
-    """alpha in 1 / unit of time. Raises CaseError where there is no such mode. Collective."""
+@dataclass(frozen=True)
+class Damping:
+    """alpha in 1 / unit of time, and where it comes from, in words."""
+
+    alpha: float
+    source: str = ""
+
+
+def damping_of(case: Case, assembly: Assembly, mass: Mass) -> Damping:
+    """The damping the case asks for. Raises CaseError where there is no such mode. Collective."""
     asked = case.spec.dynamics.damping  # type: ignore[union-attr]
     if isinstance(asked, CriticalMode):
         x = assembly.reference_vector()
@@ -31,7 +37,7 @@ def damping_of(case: Case, assembly: Assembly, mass: Mass) -> float:
         x = static_answer(case, assembly)
         number, state = 1, "the body under its loads at rest"
     else:
-        return float(asked)
+        return Damping(float(asked))
     from ancf_petsc.solve.modes import modes_at
 
     modes = modes_at(assembly, mass, x, number)
@@ -40,9 +46,7 @@ def damping_of(case: Case, assembly: Assembly, mass: Mass) -> float:
     if len(modes.omega_squared) < number or modes.omega_squared[number - 1] <= rigid:
         raise _refused(case, f"mode {number} of {state} does not vibrate: it is a rigid motion or unstable")
     omega = sqrt(modes.omega_squared[number - 1])
-    period, alpha = 2 * pi / omega, 2 * omega
-    log.info("critical damping of mode %d of %s: period %.6g, alpha = 4 pi / T = %.6g", number, state, period, alpha)
-    return alpha
+    return Damping(2 * omega, f"= 4 pi / T, critical for mode {number} of {state}: T = {2 * pi / omega:.6g}")
 
 
 def static_answer(case: Case, assembly: Assembly) -> PETSc.Vec:

@@ -35,8 +35,8 @@ class Motion:
         self.assembly = Assembly(built.model)
         self.comm = self.assembly.comm
         self.mass = Mass(self.assembly, lumped=spec.mass == "lumped")
-        damping = damping_of(case, self.assembly, self.mass)
-        self.equations = Equations(self.assembly, self.mass, damping, spec.duration)
+        self.damping = damping_of(case, self.assembly, self.mass)
+        self.equations = Equations(self.assembly, self.mass, self.damping.alpha, spec.duration)
         self.times = [spec.duration * k / spec.outputs for k in range(1, spec.outputs + 1)]
         x, v = self.assembly.reference_vector(), self.assembly.vector()
         set_velocity(v, self.mass, case.spec.initial or InitialSpec())
@@ -68,8 +68,8 @@ class Motion:
     def describe(self) -> str:
         """One line: method, mass, damping."""
         warn_of_long_step(self.integrator, self.integrator.settings.step or 0.0)
-        loss = f", damping {self.equations.damping:.6g}" if self.equations.damping else ""
-        return f"{self.integrator.describe()}, {self.spec.mass} mass{loss}"
+        loss = f"damping {self.damping.alpha:.6g} {self.damping.source}".strip() if self.damping.alpha else "no damping"
+        return f"{self.integrator.describe()}, {self.spec.mass} mass, {loss}"
 
     def facts(self) -> dict[str, float]:
         """What the summary holds beside what it has of every run."""
