@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import atexit
+import shutil
+import tempfile
 from copy import deepcopy
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
-from ancf_petsc import case_from_dict
+from ancf_petsc import case_from_dict, load_case
 from ancf_petsc.case.build import build
 from ancf_petsc.case.motion import Motion
+from ancf_petsc.case.run import run_case
+from ancf_petsc.errors import AncfError
 from ancf_petsc.solve.dynamics import TimeIntegration
 
 PROJECT = Path(__file__).resolve().parent.parent
+CASES = PROJECT / "cases"
 REFERENCE = Path(__file__).parent / "reference"
 GRAVITY = {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}
 HINGE = {"group": "hinge", "fix": ["x", "y", "z"]}
@@ -64,3 +71,15 @@ class Followed:
 def slope(sizes, errors) -> float:
     """Order of convergence by least squares in logarithms."""
     return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
+
+
+@cache
+def run_of(case: str) -> tuple[Path, AncfError | None]:
+    """Folder of a run of a shipped case, made once for all tests, and the error it ended with, if it did."""
+    folder = Path(tempfile.mkdtemp(prefix="ancf-motion-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    try:
+        run_case(load_case(CASES / case), folder)
+    except AncfError as error:
+        return folder, error
+    return folder, None

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from motion_cases import PROJECT, REFERENCE
+from motion_cases import REFERENCE, run_of
 
-from ancf_petsc import load_case
-from ancf_petsc.case.run import run_case
 from ancf_petsc.results.tables import read_table
 
 MOTIONS = {
@@ -19,11 +17,11 @@ MOTIONS = {
 
 
 @pytest.mark.parametrize(("case", "reference", "probe"), [(k, *v) for k, v in MOTIONS.items()], ids=list(MOTIONS))
-def test_runge_kutta_follows_the_reference(case, reference, probe, tmp_path):
+def test_runge_kutta_follows_the_reference(case, reference, probe):
     """Local errors of 1e-9 of the body's size in steps held short by stability: 1e-8 m at the end, measured 1e-9."""
-    run_case(load_case(PROJECT / "cases" / case), tmp_path / "run")
+    folder, _ = run_of(case)
     expected = np.genfromtxt(REFERENCE / reference, delimiter=",", names=True)
-    probes, curve = (read_table(tmp_path / "run" / f"{name}.csv") for name in ("probes", "curve"))
+    probes, curve = (read_table(folder / f"{name}.csv") for name in ("probes", "curve"))
     assert np.array_equal(probes["time"], curve["time"])
     np.testing.assert_allclose(probes["time"], expected["t"], rtol=1e-14)
     for axis in "xyz":
