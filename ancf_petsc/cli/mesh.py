@@ -20,6 +20,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--hexahedra", action="store_true", help="leave the bricks whole")
     parser.add_argument(
+        "--flat",
+        choices=("quad", "line"),
+        default="",
+        help="quad: the section half way along y; line: the axis along x",
+    )
+    parser.add_argument(
         "--order", type=int, default=1, metavar="1|2", help="2: quadratic tetrahedra (default 1)"
     )
     parser.add_argument(
@@ -48,9 +54,10 @@ def execute(arguments: argparse.Namespace) -> int:
         divisions=arguments.divisions,
         order=arguments.order,
         hexahedra=arguments.hexahedra,
+        flat=arguments.flat,
         version=arguments.format,
     )
-    _print_mesh(path)
+    _print_mesh(path, (arguments.flat,) if arguments.flat else ("tetra", "tetra10", "hexahedron"))
     return 0
 
 
@@ -64,14 +71,14 @@ def _print_bodies() -> None:
         print(f"  --size {body.size:g} (default), or --divisions, as in {divisions}")
 
 
-def _print_mesh(path: Path) -> None:
+def _print_mesh(path: Path, kinds: tuple[str, ...]) -> None:
     from rich.console import Console
     from rich.table import Table
 
     from ancf_petsc.mesh.check import statistics
     from ancf_petsc.mesh.read import read_mesh
 
-    found = statistics(read_mesh(path, ("tetra", "tetra10", "hexahedron")))
+    found = statistics(read_mesh(path, kinds))
     console = Console(highlight=False)
     console.print(f"{found.nodes} nodes, {found.cells} {found.kind} cells, volume {found.volume:.6g}")
     worst = f"worst {found.worst_quality:.3f} in cell {found.worst_cell}"

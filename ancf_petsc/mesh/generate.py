@@ -31,9 +31,12 @@ def make_mesh(
     divisions: Sequence[int] | None = None,
     order: int = 1,
     hexahedra: bool = False,
+    flat: str = "",
     version: str = "2.2",
 ) -> Path:
     """Writes a mesh of one of BODIES as a Gmsh file and returns its path.
+
+    flat: "quad" for the section of a box half way along y, "line" for its axis along x, with the groups that cut them.
 
     size: length of edges of an unstructured mesh. divisions: bricks (nx, ny, nz) of a structured one, for
     pvc_block across the wall, around, over the height. order 2 adds mid-nodes on straight edges.
@@ -47,6 +50,9 @@ def make_mesh(
         raise CaseError("the mesh file's name", key="--out", got=str(path), expected="a name ending in .msh")
     if not path.parent.is_dir():
         raise CaseError("there is no such folder", key="--out", got=str(path.parent), cure="make it first")
+    if flat:
+        _write(path, *_flat(body, body.divisions if divisions is None else divisions, flat), order, version)
+        return path
     if divisions is None and not hexahedra:
         points, cells = _unstructured(body, body.size if size is None else size)
     else:
@@ -111,6 +117,31 @@ def bricks(grid: Floats) -> tuple[Floats, Integers]:
     return grid.reshape(-1, 3), np.stack([corner.ravel() for corner in lower + upper], axis=1)
 
 
+def _flat(
+    body: Body, divisions: Sequence[int], kind: str
+) -> tuple[Floats, list[tuple[str, int, Integers]]]:
+    """Points and groups of the section half way along y (quadrilaterals in z-x) or of the axis along x (lines)."""
+    d = KINDS[kind].dimension
+    nx, _, nz = divisions
+    grid = body.grid((nx, 2, 2 * nz if d == 2 else 2))[:, 1]
+    grid = grid[::2] if d == 2 else grid[1:2]
+    index = np.arange(grid[..., 0].size).reshape(grid.shape[:2])
+    corners = [index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]]
+    cells = np.stack([c.ravel() for c in (corners if d == 2 else (index[:, :-1], index[:, 1:]))], axis=1)
+    points, spanned = grid.reshape(-1, 3), "xz"[:d]
+    sides = outer_sides(kind, cells, len(points))
+    groups: list[tuple[str, int, Integers]] = []
+    for name, planes in body.faces.items():
+        if all(axis in spanned for axis, _ in planes):
+            groups.append((name, d - 1, sides[_on(points, planes)[sides].all(axis=1)]))
+    for name, lines in body.edges.items():
+        kept = [line for line in lines if all(axis in spanned for axis, _ in line)]
+        if kept:
+            nodes = np.flatnonzero(np.any([_on(points, line) for line in kept], axis=0))
+            groups.append((name, 0, nodes[:, None]))
+    return points, [*groups, ("solid", d, cells)]
+
+
 def _group_parts(body: Body, points: Floats, cells: Integers, kind: str) -> list[tuple[str, int, Integers]]:
     """Name, dimension, parts (m, corners) of the body's groups."""
     sides = outer_sides(kind, cells, len(points))
@@ -144,7 +175,7 @@ def _write(
         for tag, (name, dimension, _) in enumerate(groups, start=1):
             gmsh.model.addDiscreteEntity(dimension, tag)
             gmsh.model.addPhysicalGroup(dimension, [tag], tag, name)
-        mesh.addNodes(3, len(groups), np.arange(1, len(points) + 1), points.ravel())
+        mesh.addNodes(groups[-1][1], len(groups), np.arange(1, len(points) + 1), points.ravel())
         for tag, (_, dimension, parts) in enumerate(groups, start=1):
             kind = part_kind(dimension, parts.shape[1])
             mesh.addElementsByType(tag, kind.gmsh, [], (parts + 1).ravel())
