@@ -27,6 +27,7 @@ VERBS = {
     "modes": ("ancf_petsc.cli.modes", "natural frequencies and shapes of a case's body"),
     "mesh": ("ancf_petsc.cli.mesh", "make one of the project's meshes at a size"),
     "new": ("ancf_petsc.cli.new", "write a commented case to start from"),
+    "bench": ("ancf_petsc.cli.bench", "time configurations with known answers"),
 }
 ABOUT = "Large-deformation solids in absolute nodal coordinates, in parallel, on PETSc."
 EPILOG = """\

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -100,26 +98,20 @@ def _self_check() -> bool:
     return good
 
 
-def _environment() -> dict[str, str]:
-    """The environment for two ranks on any machine: containers run as root and may have one core."""
-    allowed = {"OMP_NUM_THREADS": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
-    if os.geteuid() == 0:
-        allowed |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    return {**os.environ, **allowed}
-
-
 def _solve(folder: Path, ranks: int, exact: float) -> tuple[str, float]:
     """What went wrong, if anything, and the relative error of the last force."""
+    from ancf_petsc.errors import EnvironmentProblem
+    from ancf_petsc.launcher import environment, on_ranks
     from ancf_petsc.results.reader import open_results
 
-    launcher = shutil.which("mpiexec")
-    if ranks > 1 and launcher is None:
-        return "mpiexec was not found: install Open MPI or MPICH", 1.0
-    start = [str(launcher), "-n", str(ranks)] if ranks > 1 else []
     out = folder / f"run{ranks}"
-    command = [*start, sys.executable, "-m", "ancf_petsc", "run", str(folder), "--out", str(out)]
+    command = [sys.executable, "-m", "ancf_petsc", "run", str(folder), "--out", str(out)]
+    try:
+        command = on_ranks(ranks, command)
+    except EnvironmentProblem as problem:
+        return str(problem), 1.0
     done = subprocess.run(
-        command, capture_output=True, text=True, timeout=300, check=False, env=_environment()
+        command, capture_output=True, text=True, timeout=300, check=False, env=environment()
     )
     if done.returncode:
         lines = [line for line in done.stderr.splitlines() if any(c.isalnum() for c in line)]
