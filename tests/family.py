@@ -1,0 +1,103 @@
+"""Bodies that every element of the catalogue is tried on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+from mpi4py import MPI
+
+from ancf_petsc import case_from_dict
+from ancf_petsc.case.build import build
+from ancf_petsc.element.catalog import element
+from ancf_petsc.mesh.generate import bricks, make_mesh
+from ancf_petsc.mesh.kinds import KUHN
+from ancf_petsc.system.assembly import Assembly
+
+SECTION = {"thickness": 0.1, "plane": "stress"}
+
+
+def mesh_of(body: str, code: str, divisions: tuple[int, int, int], folder: Path, *, order: int = 1) -> Path:
+    """A mesh of one of the project's bodies with the cells of an element."""
+    kind = element(code).cell_name
+    path = folder / f"{body}_{kind}{order}_{'_'.join(map(str, divisions))}.msh"
+    flat = kind if kind in ("quad", "line") else ""
+    return make_mesh(body, path, divisions=divisions, hexahedra=kind == "hexahedron", flat=flat, order=order)
+
+
+def cantilever(mesh: Path, code: str, *, steps: int = 1, **mesh_keys: Any) -> dict[str, Any]:
+    """The beam of tests/reference/cantilever.csv: clamped, bent by a dead traction on its end."""
+    case = {
+        "title": f"Cantilever of {code}",
+        "mesh": {"file": str(mesh), "element": code, **mesh_keys},
+        "material": {"law": "svk", "young": 1e7, "poisson": 0.3, "density": 1000.0},
+        "constraint": [{"group": "clamp", "fix": ["x", "y", "z"]}],
+        "load": [{"type": "force", "group": "end", "total": [0.0, 0.0, -100.0]}],
+        "statics": {"steps": steps},
+        "probe": [{"name": "end", "group": "end", "mean": "area"}],
+    }
+    return case | ({"section": SECTION} if element(code).cell_name == "quad" else {})
+
+
+def unit_cube(code: str, n: int, folder: Path, *, odd: bool = False) -> Path:
+    """n x n x n cells (n x n in the plane); odd: no two cells are alike, bricks are parallelepipeds still."""
+    kind, generator = element(code).cell_name, np.random.default_rng(3)
+    steps = [np.linspace(0, 1, n + 1) for _ in range(3)]
+    if odd:
+        for axis in steps:
+            axis[1:-1] += generator.uniform(-0.2, 0.2, n - 1) / n
+    if kind == "quad":
+        x, y = np.meshgrid(steps[0], steps[1])
+        index = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+        cells = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+        points = np.stack((x.ravel(), y.ravel(), np.zeros(x.size)), axis=1)
+    else:
+        z, y, x = np.meshgrid(*steps[::-1], indexing="ij")
+        points, cells = bricks(np.stack((x, y, z), axis=-1))
+    if kind == "tetra":
+        cells = cells[:, np.array(KUHN)].reshape(-1, 4)
+        inner = ((points > 1e-9) & (points < 1 - 1e-9)).all(axis=1)
+        points[inner] += odd * 0.06 * generator.uniform(-1, 1, (int(inner.sum()), 3))
+    if odd:
+        shear = np.array([[1.0, 0.2, 0.1], [0.0, 0.9, -0.2], [0.1, 0.0, 1.2]])
+        d = 2 if kind == "quad" else 3
+        points[:, :d] = points[:, :d] @ shear[:d, :d].T
+    path = folder / f"cube_{kind}_{n}_{odd}.vtu"
+    meshio.Mesh(points, [(kind, cells)]).write(path)
+    return path
+
+
+def held_all_around(code: str, mesh: Path, folder: Path, law: str = "svk", **mesh_keys: Any) -> Assembly:
+    """A body whose whole boundary is held; its assembly on one rank."""
+    row = element(code)
+    read = meshio.read(mesh)
+    cells = read.cells_dict[row.cell_name].astype(np.int64)
+    from ancf_petsc.mesh.parts import outer_sides
+
+    sides = outer_sides(row.cell_name, cells, len(read.points))
+    named = folder / f"{mesh.stem}_held.msh"
+    _write_with_sides(named, read.points, row.cell_name, cells, sides)
+    data = {
+        "title": "Held all around",
+        "mesh": {"file": str(named), "element": code, **mesh_keys},
+        "material": {"law": law, "young": 1.0, "poisson": 0.3, "density": 1.0},
+        "constraint": [{"group": "boundary", "fix": ["x", "y", "z"][: row.components]}],
+        "statics": {"steps": 1},
+    }
+    if row.cell_name == "quad":
+        data["section"] = {"thickness": 1.0, "plane": "strain"}
+    return Assembly(build(case_from_dict(data, folder), MPI.COMM_SELF).model)
+
+
+def _write_with_sides(path: Path, points: Any, kind: str, cells: Any, sides: Any) -> None:
+    side = {"quad": "line", "tetra": "triangle", "hexahedron": "quad"}[kind]
+    tags = [np.full(len(sides), 1), np.full(len(cells), 2)]
+    dimension = {"line": 1, "triangle": 2, "quad": 2}[side]
+    meshio.Mesh(
+        points,
+        [(side, sides), (kind, cells)],
+        cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
+        field_data={"boundary": np.array([1, dimension]), "solid": np.array([2, dimension + 1])},
+    ).write(path, file_format="gmsh22", binary=False)
