@@ -84,21 +84,19 @@ class LinearSolver:
             self.ksp.setTolerances(rtol=reduction)
 
     def renew_if_tired(self, matrix: PETSc.Mat, x: PETSc.Vec) -> None:
-        """Before a solve with a new tangent at x: keep the preconditioner if its last solve was about as quick as its
-        first.
+        """Before a solve with a new tangent at x: factor it, or keep the preconditioner if its last solve was about
+        as quick as its first.
         """
-        if self.direct:
-            return
-        keep = (
-            self._fresh_rate is not None and self._rate is not None and self._rate <= TIRED * self._fresh_rate
-        )
-        self.ksp.getPC().setReusePreconditioner(keep)
-        if not keep:
+        self.ksp.setOperators(matrix)
+        pc = self.ksp.getPC()
+        tired = self._fresh_rate is None or self._rate is None or self._rate > TIRED * self._fresh_rate
+        pc.setReusePreconditioner(not (tired or self.direct))
+        if tired or self.direct:
             self._fresh_rate = None
             self.know_rigid_motions(matrix, x)
-            self.ksp.setOperators(matrix)
             with default_options({"sub_pc_type": "icc"}):
                 self.ksp.setUp()
+            pc.setReusePreconditioner(True)
 
     def note_effort(self, iterations: int, reduction: float) -> None:
         """After a solve: iterations it took for a decade of residual."""

@@ -14,6 +14,7 @@ from petsc4py import PETSc
 
 from ancf_petsc.solve.forcing import Forcing
 from ancf_petsc.solve.linear import LinearSolver
+from ancf_petsc.solve.petsc import default_options
 from ancf_petsc.system.assembly import Assembly
 
 MOST_ITERATIONS = 25
@@ -51,7 +52,9 @@ class Newton:
         self._supported = (0.0, 0.0)
         self._snes = self._create()
         self.linear = LinearSolver(assembly, self._snes.getKSP())
-        self._snes.setFromOptions()
+        # Preconditioners are renewed by hand, after each tangent: SNES itself does it the first time only.
+        with default_options({"snes_lag_preconditioner": -2}):
+            self._snes.setFromOptions()
         self.linear.read_options()
         self._forcing = Forcing(tolerance)
         self._term = PREDICTOR_TERM
