@@ -45,7 +45,9 @@ def pendulum(dynamics: dict[str, Any], **tables: Any) -> dict[str, Any]:
 
 
 class Followed:
-    """A motion that was followed to its end. rows: what `look(motion)` returned at the start and after each step."""
+    """A motion that was followed to its end. rows: what `look(motion)` returned at the start and after each
+    step.
+    """
 
     def __init__(self, data: dict[str, Any], look=None, comm: MPI.Comm = MPI.COMM_SELF) -> None:
         case = case_from_dict(data, PROJECT)
@@ -58,7 +60,7 @@ class Followed:
             if look:
                 self.rows.append(look(self.motion))
 
-        path = TimeIntegration(self.motion.integrator, self.motion.times, on_step, lambda time, jumps: None)
+        path = TimeIntegration(self.motion.integrator, self.motion.times, on_step, lambda time: None)
         try:
             path.run()
             self.positions = self.motion.integrator.x.array_r.reshape(-1, 3).copy()

@@ -14,7 +14,9 @@ from ancf_petsc.results.tables import read_table
 
 @pytest.fixture(scope="module")
 def force(tmp_path_factory):
-    """Curve of the force on the block pressed by 10 mm: by statics, or in motion over a duration (first period 3.8 ms)."""
+    """Curve of the force on the block pressed by 10 mm: by statics, or in motion over a duration (first
+    period 3.8 ms).
+    """
 
     def run(duration: float | None = None) -> np.ndarray:
         data = block("pvc_block_234.msh", 0.010, steps=10)
@@ -30,9 +32,11 @@ def force(tmp_path_factory):
 
 
 def test_the_difference_shrinks_with_the_loading_time(force):
-    """It is the drag alpha M v, so it halves with every doubling: 1.3, 0.65 and 0.32 % of the largest force."""
+    """It is the drag alpha M v, so it halves with every doubling: 1.3, 0.65, 0.32 % of the force."""
     still = force()
-    differences = [np.abs(force(duration) - still).max() / np.abs(still).max() for duration in (0.05, 0.1, 0.2)]
+    differences = [
+        np.abs(force(duration) - still).max() / np.abs(still).max() for duration in (0.05, 0.1, 0.2)
+    ]
     assert differences[2] < 0.004
     for longer, shorter in zip(differences[1:], differences, strict=False):
         assert longer == pytest.approx(shorter / 2, rel=0.05)

@@ -27,7 +27,7 @@ def worst(values):
 
 @pytest.mark.parametrize("case", ["case.toml", "fast.toml"])
 def test_free_flight_keeps_energy_and_momenta(case):
-    """1000 steps of 20 times the explicit limit: 1e-8 of each, from Newton's tolerance 1e-11; measured 2e-10."""
+    """1000 steps of 20 times the explicit limit: 1e-8 of each, from Newton's tolerance 1e-11."""
     curve = read_table(run_of(f"tumbling_block/{case}")[0] / "curve.csv")
     energy = curve["kinetic_energy"] + curve["strain_energy"]
     assert curve["steps"].sum() == 1000
@@ -47,8 +47,12 @@ def test_free_flight_of_neo_hooke_keeps_them_too(tmp_path):
 
 @pytest.mark.parametrize("case", ["trapezoidal.toml", "fast_trapezoidal.toml"])
 def test_the_trapezoidal_rule_gains_energy_until_it_fails(case, tmp_path):
-    """Before step 400, or with 1.5 times the energy; what was before is kept and the failure is told in words."""
-    with pytest.raises(MotionStopped, match="theta cannot go on from time .*; try a smaller dynamics.step") as failure:
+    """Before step 400, or with 1.5 times the energy; what was before is kept and the failure is told in
+    words.
+    """
+    with pytest.raises(
+        MotionStopped, match="theta cannot go on from time .*; try a smaller dynamics.step"
+    ) as failure:
         curve_of(f"tumbling_block/{case}", tmp_path / "run")
     assert failure.value.exit_code == 3
     curve = read_table(tmp_path / "run" / "curve.csv")
@@ -67,9 +71,17 @@ def test_a_stiff_pendulum_keeps_its_energy_where_no_vibration_is_resolved(tmp_pa
 
 
 def test_work_of_driven_nodes_and_loads_is_exact(tmp_path):
-    """A driven hinge, a damped fall, steps far too long: the balance holds to Newton's tolerance all the same."""
+    """A driven hinge, a damped fall, steps far too long: the balance holds to Newton's tolerance all the
+    same.
+    """
     changes = {
-        "dynamics": {"duration": 1.0, "integrator": "energy_momentum", "step": 0.02, "damping": 2.0, "outputs": 25},
+        "dynamics": {
+            "duration": 1.0,
+            "integrator": "energy_momentum",
+            "step": 0.02,
+            "damping": 2.0,
+            "outputs": 25,
+        },
         "constraint.hinge.fix": ["x", "y"],
         "constraint.hinge.move": {"z": 0.2},
     }

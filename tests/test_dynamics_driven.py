@@ -24,7 +24,7 @@ METHODS = {
 
 def driven_of(motion):
     model = motion.assembly.model
-    moved = (model.motion[: model.owned, 2] >= 0)
+    moved = model.motion[: model.owned, 2] >= 0
     z = motion.integrator.x.array_r.reshape(-1, 3)[moved, 2] - model.reference[: model.owned][moved, 2]
     return motion.integrator.time, z
 
@@ -32,14 +32,18 @@ def driven_of(motion):
 @pytest.mark.parametrize("name", METHODS)
 def test_every_method_keeps_driven_nodes_on_their_path(name):
     """After every step, to rounding."""
-    data = pendulum({"duration": 0.1, "outputs": 2, "integrator": name, "step": METHODS[name]}, constraint=[LIFT])
+    data = pendulum(
+        {"duration": 0.1, "outputs": 2, "integrator": name, "step": METHODS[name]}, constraint=[LIFT]
+    )
     for time, z in Followed(data, driven_of).rows:
         np.testing.assert_allclose(z, 0.1 * (1 - np.cos(np.pi * time / 0.1)) / 2, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", ["generalized_alpha", "energy_momentum", "theta"])
 def test_driven_nodes_leave_the_order_as_it_is(name):
-    """On a body so soft that the steps resolve all its modes: the cosine ramp begins with a jump of the acceleration."""
+    """On a body so soft that the steps resolve all its modes: the cosine ramp begins with a jump of the
+    acceleration.
+    """
 
     def positions(**dynamics):
         how = {"duration": 0.5, "outputs": 1, **dynamics}
@@ -65,8 +69,12 @@ def test_energy_balances_with_driven_nodes_and_loss(tmp_path):
 
 
 def test_reactions_change_the_momentum(tmp_path):
-    """d P / dt = gravity + reactions - alpha P; the integral by Simpson's rule over 200 outputs, to its error 1e-3."""
-    curve = run(tmp_path / "run", LIFT, integrator="runge_kutta_5dp", tolerance=1e-8, damping=2.0, outputs=400)
+    """d P / dt = gravity + reactions - alpha P; the integral by Simpson's rule over 200 outputs, to its
+    error 1e-3.
+    """
+    curve = run(
+        tmp_path / "run", LIFT, integrator="runge_kutta_5dp", tolerance=1e-8, damping=2.0, outputs=400
+    )
     weight = 39.0 * 9.81
     force = curve["hinge.rz"] - weight - 2.0 * curve["momentum.z"]
     h = curve["time"][1]
@@ -76,7 +84,9 @@ def test_reactions_change_the_momentum(tmp_path):
 
 @pytest.mark.parametrize("name", ["energy_momentum", "runge_kutta_5dp", "generalized_alpha"])
 def test_a_corner_of_a_ramp_is_hit_and_its_impulse_counted(name, tmp_path):
-    """A velocity that jumps at s = 0.3 (between two outputs) and at 0.6: the impulse's work closes the balance."""
+    """A velocity that jumps at s = 0.3 (between two outputs) and at 0.6: the impulse's work closes the
+    balance.
+    """
     kinked = {**LIFT, "move": {"z": 0.05}, "ramp": [[0, 0], [0.3, 0], [0.6, 1], [1, 1]]}
     how = {"step": 2e-4} if name != "runge_kutta_5dp" else {"tolerance": 1e-8}
     curve = run(tmp_path / "run", kinked, integrator=name, **how, outputs=7)

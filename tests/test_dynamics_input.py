@@ -20,14 +20,23 @@ def case(dynamics, **tables):
 
 
 WRONG = {
-    "negative duration": ({"duration": -1.0, "step": 0.1}, "dynamics.duration: found -1.0, expected a number > 0"),
+    "negative duration": (
+        {"duration": -1.0, "step": 0.1},
+        "dynamics.duration: found -1.0, expected a number > 0",
+    ),
     "negative step": ({"duration": 1.0, "step": -0.1}, "dynamics.step: found -0.1, expected a number > 0"),
-    "unknown integrator": ({"duration": 1.0, "step": 0.1, "integrator": "euler"}, "generalized_alpha, energy_momentum"),
+    "unknown integrator": (
+        {"duration": 1.0, "step": 0.1, "integrator": "euler"},
+        "generalized_alpha, energy_momentum",
+    ),
     "step and tolerance": (
         {"duration": 1.0, "step": 0.1, "tolerance": 1e-3, "integrator": "bdf"},
         "step and tolerance given",
     ),
-    "bdf of order 3": ({"duration": 1.0, "step": 0.1, "integrator": "bdf", "order": 3}, "orders above 2 are unstable"),
+    "bdf of order 3": (
+        {"duration": 1.0, "step": 0.1, "integrator": "bdf", "order": 3},
+        "orders above 2 are unstable",
+    ),
 }
 
 
@@ -49,7 +58,9 @@ def test_a_step_far_too_long_is_warned_of_and_stops_with_what_was_good(tmp_path,
     """omega h = 2.2: the motion runs into numbers that are not finite; results up to there are whole."""
     caplog.set_level("INFO", "ancf")
     dynamics = {"duration": 1.0, "outputs": 50, "integrator": "runge_kutta_5dp", "step": 1e-3}
-    with pytest.raises(MotionStopped, match="runge_kutta_5dp cannot go on from time .* not finite any more") as failure:
+    with pytest.raises(
+        MotionStopped, match="runge_kutta_5dp cannot go on from time .* not finite any more"
+    ) as failure:
         run_case(case(dynamics), tmp_path / "run")
     assert failure.value.exit_code == 3
     assert "is above the stable step of runge_kutta_5dp" in caplog.text

@@ -20,7 +20,7 @@ def modes(folder, case=BAR, *, count=6, loaded=False, changes=()):
 
 
 def test_periods_of_the_bar(tmp_path):
-    """By a dense eigensolver of another program: bending twice, and the axial mode the load moves, the sixth."""
+    """By a dense eigensolver of another program: bending twice, and the axial mode, the sixth."""
     found = modes(tmp_path / "modes")
     np.testing.assert_allclose(found["period"][[0, 1, 5]], [2.422115, 2.06323, 0.386335], rtol=2e-6)
     assert found["critical_damping"][0] == pytest.approx(5.1882, rel=1e-5)
@@ -33,7 +33,9 @@ def test_first_period_under_load(tmp_path):
 
 
 def test_axial_frequency_is_that_of_a_rod(tmp_path):
-    """T = 4 L sqrt(rho / E) without lateral contraction; 10 elements along make it (pi/20)^2/24 = 0.1 % shorter."""
+    """T = 4 L sqrt(rho / E) without lateral contraction; 10 elements along make it (pi/20)^2/24 = 0.1 %
+    shorter.
+    """
     found = modes(tmp_path / "modes", changes=["material.poisson=0.0"], count=8)
     rod = 4 * 0.5 * np.sqrt(7800.0 / 2e5)
     error = np.abs(found["period"] / rod - 1)

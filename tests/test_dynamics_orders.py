@@ -1,7 +1,8 @@
 """Orders of the integrators, measured.
 
-Implicit ones on the pendulum with gravity raised by a cosine over 0.5 s: gravity at once would excite modes that no such step
-resolves. Explicit ones resolve every mode: gravity at once, and steps inside the limit of stability, omega h = 0.9 to 0.3.
+Implicit ones on the pendulum with gravity raised by a cosine over 0.5 s: gravity at once would excite modes
+that no such step resolves. Explicit ones resolve every mode: gravity at once, and steps inside the limit of
+stability, omega h = 0.9 to 0.3.
 """
 
 from __future__ import annotations
@@ -50,7 +51,9 @@ def test_second_order(how, raised_answer):
 
 
 def test_backward_euler_is_of_first_order(raised_answer):
-    errors = [np.abs(raised(step=0.5 / n, integrator="theta", theta=1.0) - raised_answer).max() for n in SLOW[2:]]
+    errors = [
+        np.abs(raised(step=0.5 / n, integrator="theta", theta=1.0) - raised_answer).max() for n in SLOW[2:]
+    ]
     assert -slope(SLOW[2:], errors) == pytest.approx(1.0, abs=0.15)
 
 
@@ -68,9 +71,10 @@ def test_explicit_orders(name, order, sudden_answer):
 
 @pytest.mark.parametrize("name", ["runge_kutta_5dp", "rosenbrock", "bdf"])
 def test_a_smaller_tolerance_brings_a_smaller_error(name, raised_answer):
-    """Error control: from 1e-4 to 1e-6 the error falls to less than a fifth, and so do outputs between steps."""
+    """Error control: from 1e-4 to 1e-6 the error falls to less than a fifth."""
     errors = [
-        np.abs(raised(integrator=name, tolerance=tolerance) - raised_answer).max() for tolerance in (1e-4, 1e-6)
+        np.abs(raised(integrator=name, tolerance=tolerance) - raised_answer).max()
+        for tolerance in (1e-4, 1e-6)
     ]
     assert errors[1] < errors[0] / 5 or errors[0] < 1e-6
     assert errors[1] < 1e-3

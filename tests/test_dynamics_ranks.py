@@ -45,7 +45,9 @@ def programs(tmp_path_factory):
 
 
 def test_same_numbers_on_one_two_and_three_ranks(mpirun, programs, project):
-    """Positions and velocities of all nodes in file order; 1e-8 for implicit methods, 1e-10 for explicit fixed steps."""
+    """Positions and velocities of all nodes in file order; 1e-8 for implicit methods, 1e-10 for explicit
+    fixed steps.
+    """
     found = []
     for ranks in (1, 2, 3):
         said = mpirun(ranks, [programs, project / "tests", json.dumps(STEPS)]).stdout

@@ -1,4 +1,6 @@
-"""Motions against an independent code: DOP853 on the same equations, within 1e-10 m of itself (reference/README.md)."""
+"""Motions against an independent code: DOP853 on the same equations, within 1e-10 m of itself
+(reference/README.md).
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,13 @@ MOTIONS = {
 }
 
 
-@pytest.mark.parametrize(("case", "reference", "probe"), [(k, *v) for k, v in MOTIONS.items()], ids=list(MOTIONS))
+@pytest.mark.parametrize(
+    ("case", "reference", "probe"), [(k, *v) for k, v in MOTIONS.items()], ids=list(MOTIONS)
+)
 def test_runge_kutta_follows_the_reference(case, reference, probe):
-    """Local errors of 1e-9 of the body's size in steps held short by stability: 1e-8 m at the end, measured 1e-9."""
+    """Local errors of 1e-9 of the body's size in steps held short by stability: 1e-8 m at the end, measured
+    1e-9.
+    """
     folder, _ = run_of(case)
     expected = np.genfromtxt(REFERENCE / reference, delimiter=",", names=True)
     probes, curve = (read_table(folder / f"{name}.csv") for name in ("probes", "curve"))

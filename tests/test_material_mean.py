@@ -42,7 +42,9 @@ def test_one_state_alone_gives_its_stress(law):
 @each_law
 @pytest.mark.parametrize("size", [0.3, 1e-2, 0.0])
 def test_mean_tangent_is_the_derivative_of_the_mean_stress(law, size):
-    """By central differences of step 1e-5, error about 1e-9 (and 1e-5 where the states coincide: N : N is the step's)."""
+    """By central differences of step 1e-5, error about 1e-9 (and 1e-5 where the states coincide: N : N is
+    the step's).
+    """
     p, h = law.parameters(2.0, 0.3), 1e-5
     F0, F1 = states(size)
     u, v = (0.3, -1.0, 0.5), (1.0, 0.2, -0.7)

@@ -1,4 +1,6 @@
-"""The damping alpha of a case: a number, or critical for a mode: alpha = 4 pi / T, Olshevskiy et al. (2017), Eq. (16)."""
+"""The damping alpha of a case: a number, or critical for a mode: alpha = 4 pi / T, Olshevskiy et al.
+(2017), Eq. (16).
+"""
 
 from __future__ import annotations
 
@@ -53,9 +55,7 @@ def static_answer(case: Case, assembly: Assembly) -> PETSc.Vec:
     """The body at rest under its loads and moves as they are at the end. Collective."""
     model = assembly.model
     linear = Ramp("linear")
-    loads = [
-        replace(load, pattern=load.ramp.value(1.0) * load.pattern, ramp=linear) for load in model.loads
-    ]
+    loads = [replace(load, pattern=load.ramp.value(1.0) * load.pattern, ramp=linear) for load in model.loads]
     motions = [
         replace(motion, amplitude=motion.value(1.0), ramp=linear) if motion.amplitude else motion
         for motion in model.motions
@@ -77,5 +77,6 @@ def _refused(case: Case, why: str) -> CaseError:
         file=case.file,
         key="dynamics.damping",
         expected="a mode to damp critically",
-        cure="give a number, or { critical = n } with a mode of the unloaded body that vibrates (ancf modes lists them)",
+        cure="give a number, or { critical = n } with a mode of the unloaded body that vibrates "
+        "(ancf modes lists them)",
     )

@@ -48,10 +48,14 @@ class Motion:
             raise
 
     def _settings(self) -> Settings:
-        """What the case says of the integrator, the step shortened so that equal ones fill an output's interval."""
+        """What the case says of the integrator, the step shortened so that equal ones fill an output's
+        interval.
+        """
         spec, interval = self.spec, self.spec.duration / self.spec.outputs
-        size = None if spec.step is None else interval / steps_in(interval, spec.step)
-        if size is not None and abs(size - spec.step) > 1e-9 * spec.step:
+        if spec.step is None:
+            return Settings(0.0, spec.tolerance or 0.0, spec.spectral_radius, spec.theta, spec.order)
+        size = interval / steps_in(interval, spec.step)
+        if abs(size - spec.step) > 1e-9 * spec.step:
             log.info(
                 "step %.6g shortened to %.6g: %d equal steps fill the interval of outputs, %.6g",
                 spec.step,
@@ -59,7 +63,7 @@ class Motion:
                 round(interval / size),
                 interval,
             )
-        return Settings(size, spec.tolerance, spec.spectral_radius, spec.theta, spec.order)
+        return Settings(size, 0.0, spec.spectral_radius, spec.theta, spec.order)
 
     def prepare(self) -> None:
         """Set the solvers up, so that every option has been asked for."""
@@ -67,8 +71,12 @@ class Motion:
 
     def describe(self) -> str:
         """One line: method, mass, damping."""
-        warn_of_long_step(self.integrator, self.integrator.settings.step or 0.0)
-        loss = f"damping {self.damping.alpha:.6g} {self.damping.source}".strip() if self.damping.alpha else "no damping"
+        warn_of_long_step(self.integrator, self.integrator.settings.step)
+        loss = (
+            f"damping {self.damping.alpha:.6g} {self.damping.source}".strip()
+            if self.damping.alpha
+            else "no damping"
+        )
         return f"{self.integrator.describe()}, {self.spec.mass} mass, {loss}"
 
     def facts(self) -> dict[str, float]:

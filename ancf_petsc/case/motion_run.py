@@ -27,7 +27,9 @@ log = logging.getLogger(STEPS)
 
 
 class MotionRun:
-    """Follows a motion and records it. watch: told the part done, 0 to 1. stop: whether to end after this step."""
+    """Follows a motion and records it. watch: told the part done, 0 to 1. stop: whether to end after this
+    step.
+    """
 
     def __init__(
         self,
@@ -80,33 +82,32 @@ class MotionRun:
         self.watch(step.time / self.duration)
 
     def _add_work(self, step: Step) -> None:
-        """Every step where something changes along it; dead loads that stay need the ends of intervals only."""
-        if step.work is not None:
-            self.work.add_known(step.work, step.dissipated)
+        """Every step where something changes along it; dead loads that stay need ends of intervals."""
+        if step.known is not None:
+            self.work.add_known(*step.known)
             return
         often = self.equations.damping or self.equations.moving or self._ramped
         if often or step.time in self.times or step.time in self.path.corners:
             self.work.add(step.time, self._powers())
 
-    def _on_corner(self, now: float, jumps: bool) -> None:
-        impulse = self._kinetic_energy() - self._kinetic if jumps else 0.0
-        self.work.start(now, self._powers(), impulse)
+    def _on_corner(self, now: float) -> None:
+        """The work of an impulse is what it adds to the kinetic energy: positions stay."""
+        self.work.start(now, self._powers(), self._kinetic_energy() - self._kinetic)
 
     def _powers(self) -> Powers:
-        equations, v = self.equations, self._velocity()
-        patterns = [load.pattern for load in self.assembly.model.loads]
-        rates = [float(np.vdot(pattern, v)) for pattern in patterns]
-        loss = (0.0, 0.0)
-        a = self._acceleration() if equations.damping or equations.moving else None
-        if equations.damping:
-            carried = self.mass.times(v)
-            loss = (float(np.vdot(v, carried)), 2 * float(np.vdot(a, carried)))
-        local = np.array([*loss, *rates])
-        loss_now, loss_rate, *rates = self.assembly.comm.allreduce(local)
-        balance = equations.out_of_balance(self.integrator.time, self.integrator.x, v, a) if equations.moving else v
+        """Loss, and what loads and driven nodes see; accelerations only where they are needed."""
+        equations, v, model = self.equations, self._velocity(), self.assembly.model
+        loss, loss_rate, balance = 0.0, 0.0, np.zeros_like(v)
+        if equations.damping or equations.moving:
+            a, carried = self._acceleration(), self.mass.times(v)
+            loss, loss_rate = float(np.vdot(v, carried)), 2 * float(np.vdot(a, carried))
+            if equations.moving:
+                balance = equations.out_of_balance(self.integrator.time, self.integrator.x, v, a)
+        rates = [float(np.vdot(load.pattern, v)) for load in model.loads]
+        loss, loss_rate, *rates = self.assembly.comm.allreduce(np.array([loss, loss_rate, *rates]))
         reactions, seen = conjugates(self.assembly, self.integrator.x, balance)
         alpha = equations.damping
-        return Powers(alpha * loss_now, alpha * loss_rate, seen, np.array(rates), reactions)
+        return Powers(alpha * loss, alpha * loss_rate, seen, np.array(rates), reactions)
 
     def _velocity(self) -> NDArray[np.float64]:
         return self.integrator.v.array_r.reshape(-1, 3)

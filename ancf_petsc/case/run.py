@@ -149,7 +149,7 @@ def _summarise(
             dof=dof,
             ranks=comm.size,
             iterations={"newton": totals["newton_iterations"], "linear": totals["linear_iterations"]},
-            final=final,
+            final=dict(final),
             versions=versions(),
             note=case.spec.note,
             steps=totals["steps"],

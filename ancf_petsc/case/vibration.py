@@ -33,7 +33,8 @@ log = logging.getLogger("ancf")
 def find_modes(
     case: Case, folder: Path, count: int, *, loaded: bool, force: bool, comm: MPI.Comm = MPI.COMM_WORLD
 ) -> NDArray[np.float64]:
-    """Rows (m, 5) of COLUMNS, written to modes.csv; shapes to results.h5 and .xdmf. Collective. Raises CaseError.
+    """Rows (m, 5) of COLUMNS, written to modes.csv; shapes to results.h5 and .xdmf. Collective. Raises
+    CaseError.
 
     loaded: of the body at rest under its loads, else of the undeformed one.
     """

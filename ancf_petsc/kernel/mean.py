@@ -26,6 +26,8 @@ class MeanKernels(NamedTuple):
 def make_mean_kernels(law: Law) -> MeanKernels:
     """Kernels of element 3413 for a law with `mean_stress` and `mean_tangent`."""
     stress, block_of = law.mean_stress, law.mean_tangent
+    assert stress is not None
+    assert block_of is not None
 
     @kernel
     def force(positions_0, positions_1, cells, gradients, volumes, parameters, first, last, result):
@@ -54,7 +56,7 @@ def make_mean_kernels(law: Law) -> MeanKernels:
         driven,
         values,
     ):
-        """Add dforce/dr1, which is not symmetric, to values; starts, strides, split, driven as in `tet3413`."""
+        """Add dforce/dr1, which is not symmetric, to values; starts to driven as in `tet3413`."""
         for e in range(first, last):
             nodes, G, w = cells[e], gradients[e], volumes[e]
             F0, F1 = edge_sum(positions_0, nodes, G), edge_sum(positions_1, nodes, G)

@@ -26,7 +26,7 @@ class TimeIntegration:
         integrator: Integrator,
         outputs: Sequence[float],
         on_step: Callable[[Step], None],
-        on_corner: Callable[[float, bool], None],
+        on_corner: Callable[[float], None],
         interrupted: Callable[[], bool] = lambda: False,
     ) -> None:
         self.integrator = integrator
@@ -42,18 +42,20 @@ class TimeIntegration:
             vector.destroy()
 
     def run(self) -> None:
-        """To the last output. Raises MotionStopped with the last good state in place, Interrupted when asked to stop."""
+        """To the last output. Raises MotionStopped with the last good state in place, Interrupted when
+        asked to stop.
+        """
         for begin, end in pairwise(self.marks):
             for goal in self._goals(begin, end):
                 while self.integrator.time < goal:
                     self._advance(goal)
             if end in self.corners:
-                jumps = self.equations.pass_corner(end, self.integrator.v)
+                self.equations.pass_corner(end, self.integrator.v)
                 self.integrator.restart()
-                self.on_corner(end, jumps)
+                self.on_corner(end)
 
     def _goals(self, begin: float, end: float) -> list[float]:
-        """Ends of fixed steps, equal within the interval; of a method that adapts, the interval's end alone."""
+        """Ends of fixed steps, equal within the interval; its end alone where the method adapts."""
         if self.integrator.adaptive:
             return [end]
         parts = steps_in(end - begin, self.integrator.settings.step)
@@ -89,7 +91,7 @@ def warn_of_long_step(integrator: Integrator, size: float) -> None:
     longest = integrator.longest_stable
     if longest is None:
         return
-    limit = integrator.highest_stable
+    limit = integrator.highest_stable or 0.0
     log.info(
         "highest frequency about %.6g rad per unit of time: stable steps up to about %.4g (omega h <= %g)",
         limit / longest,
@@ -98,7 +100,7 @@ def warn_of_long_step(integrator: Integrator, size: float) -> None:
     )
     if not integrator.adaptive and size > longest:
         log.warning(
-            "dynamics.step = %.4g is above the stable step of %s: the motion may run into non-finite numbers; "
+            "dynamics.step = %.4g is above the stable step of %s: it may run into non-finite numbers; "
             "take step = %.3g or less",
             size,
             integrator.name,

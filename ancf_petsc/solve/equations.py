@@ -1,7 +1,7 @@
 """The equations of motion M (q'' + alpha q') + Q(q) = Q_e(t), Olshevskiy et al. (2017), Eqs. (13) and (16).
 
-Driven degrees of freedom follow their ramps; s = t / duration. Where a ramp has a corner their velocity jumps, and with the
-consistent mass the free nodes beside them get their share of the impulse.
+Driven degrees of freedom follow their ramps; s = t / duration. Where a ramp has a corner their velocity
+jumps, and with the consistent mass the free nodes beside them get their share of the impulse.
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ class Equations:
     def driven_velocities(self, t: float) -> NDArray[np.float64]:
         """Of the driven degrees of freedom (c,); at the end of a smooth piece those it ends with."""
         s = min(t / self.duration, self._piece_end)
-        rates = [motion.amplitude * motion.ramp.rate(s) / self.duration for motion in self.assembly.model.motions]
+        rates = [
+            motion.amplitude * motion.ramp.rate(s) / self.duration for motion in self.assembly.model.motions
+        ]
         return np.array(rates or [0.0])[self.assembly.driven_motion]
 
     def driven_accelerations(self, t: float) -> NDArray[np.float64]:
@@ -73,21 +75,22 @@ class Equations:
             x.array[driven] = self.driven_positions(t)
             v.array[driven] = self.driven_velocities(t)
 
-    def pass_corner(self, t: float, v: PETSc.Vec) -> bool:
-        """Enter the smooth piece after t. Velocities of driven nodes may jump: v then holds those after the impulse."""
+    def pass_corner(self, t: float, v: PETSc.Vec) -> None:
+        """Enter the smooth piece after t. Velocities of driven nodes may jump: v then holds those after the
+        impulse.
+        """
         if not self.moving:
             self._piece_end = self._end_of_piece(t)
-            return False
+            return
         driven = self.assembly.driven
         jump = np.zeros((self.assembly.model.owned, 3))
         before = self.driven_velocities(t)
         self._piece_end = self._end_of_piece(t)
         jump.ravel()[driven] = self.driven_velocities(t) - before
         if not self.comm.allreduce(float(np.abs(jump).max(initial=0.0))):
-            return False
+            return
         change = jump - self.solver.solve(self.mass.times(jump))
         v.array[:] += change.ravel()
-        return True
 
     def _end_of_piece(self, t: float) -> float:
         """The last s before the next corner."""
@@ -119,7 +122,8 @@ class Equations:
         return inertia + self.assembly.internal_force(x)[0] - self.loads(t)
 
     def highest_frequency(self, x: PETSc.Vec, iterations: int = 30) -> float:
-        """Estimate of the largest omega of M^-1 K at x in rad / unit of time, some percent on the safe side. Collective.
+        """Estimate of the largest omega of M^-1 K at x in rad / unit of time, some percent on the safe
+        side. Collective.
 
         Power iteration approaches it from below, to 3 % on the meshes tried: 5 % are added.
         """

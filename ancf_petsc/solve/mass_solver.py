@@ -1,8 +1,9 @@
 """Solving with the mass matrix of the free degrees of freedom.
 
-One rank: the inverse for very small bodies, else PETSc's Cholesky of the scalar mass; one of them per set of free nodes, all its
-components at once. Several ranks, or a large body: Chebyshev's iteration over the diagonal on fixed bounds (Golub and Varga
-1961): no dot products, so every number of ranks gives the same numbers.
+One rank: the inverse for very small bodies, else PETSc's Cholesky of the scalar mass; one of them per set
+of free nodes, all its components at once. Several ranks, or a large body: Chebyshev's iteration over the
+diagonal on fixed bounds (Golub and Varga 1961): no dot products, so every number of ranks gives the same
+numbers.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ ACCURACY = 1e-13
 
 
 class MassSolver:
-    """Solves M a = b on the free degrees of freedom; driven ones get 0. way: inverse, cholesky, chebyshev; None chooses."""
+    """Solves M a = b on the free degrees of freedom; driven ones get 0. way: inverse, cholesky, chebyshev;
+    None chooses.
+    """
 
     def __init__(self, mass: Mass, way: str | None = None) -> None:
         self.mass = mass
@@ -101,7 +104,7 @@ class _Factor:
     """The factor of the mass of some nodes, and the components it serves."""
 
     def __init__(self, matrix: csr_array, rows: NDArray, axes: list[int], _: int) -> None:
-        self.place = np.ix_(rows, axes)
+        self.place = np.ix_(rows, np.array(axes))
         size, count = len(rows), len(axes)
         integers = PETSc.IntType
         csr = (matrix.indptr.astype(integers), matrix.indices.astype(integers), matrix.data)

@@ -18,7 +18,9 @@ TOLERANCE = 1e-10
 
 @dataclass(frozen=True)
 class Modes:
-    """omega_squared (m,) ascending, negative where the state is unstable; shapes (m, n, 3), of mass 1, on owned nodal vectors."""
+    """omega_squared (m,) ascending, negative where the state is unstable; shapes (m, n, 3), of mass 1, on
+    owned nodal vectors.
+    """
 
     omega_squared: NDArray[np.float64]
     shapes: NDArray[np.float64]
@@ -30,10 +32,12 @@ class Modes:
 
 
 def modes_at(assembly: Assembly, mass: Mass, x: PETSc.Vec, count: int) -> Modes:
-    """The `count` modes of lowest omega squared of the tangent at x, driven degrees of freedom held. Collective.
+    """The `count` modes of lowest omega squared of the tangent at x, driven degrees of freedom held.
+    Collective.
 
-    Driven degrees of freedom have stiffness but no mass: their eigenvalues are infinite and never seen. The inverse is taken at
-    a shift below zero, about the lowest omega squared of the body's size, so that rigid motions do no harm.
+    Driven degrees of freedom have stiffness but no mass: their eigenvalues are infinite and never seen. The
+    inverse is taken at a shift below zero, about the lowest omega squared of the body's size, so that rigid
+    motions do no harm.
     """
     stiffness = assembly.create_matrix()
     assembly.tangent(x, stiffness)
@@ -46,7 +50,9 @@ def modes_at(assembly: Assembly, mass: Mass, x: PETSc.Vec, count: int) -> Modes:
         solver.solve()
         found = solver.getConverged()
         if found < min(count, free):
-            raise AncfError(f"only {found} of {count} modes were found: ask for fewer, or look at the material")
+            raise AncfError(
+                f"only {found} of {count} modes were found: ask for fewer, or look at the material"
+            )
         return _collect(solver, assembly, min(count, free))
     finally:
         for item in (solver, inertia, stiffness):
@@ -54,7 +60,9 @@ def modes_at(assembly: Assembly, mass: Mass, x: PETSc.Vec, count: int) -> Modes:
 
 
 def _shift(assembly: Assembly, mass: Mass) -> float:
-    """A small negative number on the scale of omega squared: stiffness over mass, over the number of nodes squared."""
+    """A small negative number on the scale of omega squared: stiffness over mass, over the number of nodes
+    squared.
+    """
     own = float(mass.diagonal.max(initial=0.0))
     heaviest = max(assembly.comm.allgather(own))
     nodes = assembly.model.dof / 3

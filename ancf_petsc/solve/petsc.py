@@ -30,7 +30,9 @@ def petsc_options(given: Mapping[str, object]) -> Iterator[None]:
 
 @contextmanager
 def default_options(defaults: Mapping[str, object]) -> Iterator[None]:
-    """Options for the time of a `setFromOptions`, for what has no binding; those of case and command line stay stronger."""
+    """Options for the time of a `setFromOptions`, for what has no binding; those of case and command line
+    stay stronger.
+    """
     database = PETSc.Options()
     added = [name for name in defaults if not database.hasName(name)]
     for name in added:

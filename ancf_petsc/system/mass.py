@@ -57,8 +57,9 @@ class Mass:
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
-        """Within which the eigenvalues of the matrix over its diagonal lie, whatever is held: those of single cells (Wathen,
-        IMA J. Numer. Anal. 7 (1987) 449). Collective."""
+        """Within which the eigenvalues of the matrix over its diagonal lie, whatever is held: those of
+        single cells (Wathen, IMA J. Numer. Anal. 7 (1987) 449). Collective.
+        """
         maps, row = self.assembly.model.slope_maps, self.assembly.model.element
         low, high = np.inf, 0.0
         for chunk in np.array_split(maps, len(maps) // CHUNK + 1) if maps.shape[1] else [maps[:1]]:

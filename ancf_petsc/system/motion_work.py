@@ -1,7 +1,8 @@
-"""Work of loads and driven nodes and loss in a motion, added up step by step to a higher order than the motion has.
+"""Work of loads and driven nodes and loss in a motion, added up step by step to a higher order than the
+motion has.
 
-Loss and load ramps: cubics through values and derivatives at both ends of a step. Driven nodes: the polynomial through the last
-states, as along a quasi-static path.
+Loss and load ramps: cubics through values and derivatives at both ends of a step. Driven nodes: the
+polynomial through the last states, as along a quasi-static path.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ ABSCISSAE, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 @dataclass(frozen=True)
 class Powers:
-    """What the sums need of a state: rate of loss and its derivative, what loads see (l,) and its rate, reactions (m,)."""
+    """What the sums need of a state: rate of loss and its derivative, what loads see (l,) and its rate,
+    reactions (m,).
+    """
 
     loss: float
     loss_rate: float
@@ -40,7 +43,7 @@ class MotionWork:
         self._of_impulses = 0.0
         self._driven = PathWork(motions, [])
         self._drives = any(motion.amplitude for motion in motions)
-        self._time, self._powers = 0.0, None
+        self._time, self._powers = 0.0, Powers(0.0, 0.0, np.zeros(0), np.zeros(0), np.zeros(0))
 
     @property
     def external(self) -> float:
@@ -76,7 +79,9 @@ class MotionWork:
                 continue
             for point, weight in zip((ABSCISSAE + 1) / 2, WEIGHTS / 2, strict=True):
                 rate = load.ramp.rate(s0 + point * (s1 - s0)) / self.duration
-                seen = _cubic(point, h, (before.seen[k], now.seen[k]), (before.seen_rate[k], now.seen_rate[k]))
+                seen = _cubic(
+                    point, h, (before.seen[k], now.seen[k]), (before.seen_rate[k], now.seen_rate[k])
+                )
                 work -= h * weight * rate * seen
         return float(work)
 

@@ -17,10 +17,10 @@ SHORTEST = 1e-13  # of the duration: a step so short does not move the clock rel
 
 @dataclass(frozen=True)
 class Settings:
-    """What a case may set. Either step or tolerance is None."""
+    """What a case may set. step: 0 where the method chooses its steps by `tolerance`."""
 
-    step: float | None = None
-    tolerance: float | None = None
+    step: float = 0.0
+    tolerance: float = 0.0
     spectral_radius: float = 0.8
     theta: float = 0.5
     order: int = 2
@@ -28,15 +28,14 @@ class Settings:
 
 @dataclass(frozen=True)
 class Step:
-    """An accepted step. work, dissipated: external work and loss in it, where the method has them exactly."""
+    """An accepted step. known: external work and loss in it, where the method has them exactly."""
 
     time: float
     size: float
     newton: int = 0
     linear: int = 0
     rejected: int = 0
-    work: float | None = None
-    dissipated: float | None = None
+    known: tuple[float, float] | None = None
 
 
 class Integrator(ABC):
@@ -53,7 +52,7 @@ class Integrator(ABC):
         self.settings = settings
         self.time = 0.0
         self.x, self.v = x, v
-        self.a: NDArray[np.float64] | None = None
+        self.a: NDArray[np.float64] = np.zeros((0, 3))
         self.ts = PETSc.TS().create(equations.comm)
         self.ts.setMaxTime(1e300)
         self.ts.setMaxSteps(2**31 - 1)
@@ -63,7 +62,7 @@ class Integrator(ABC):
     @property
     def adaptive(self) -> bool:
         """Whether the method chooses its steps."""
-        return self.settings.step is None
+        return self.settings.step == 0.0
 
     @property
     def longest_stable(self) -> float | None:
@@ -79,7 +78,8 @@ class Integrator(ABC):
         self.ts.restartStep()
 
     def set_solver_up(self) -> None:
-        """Set the linear solver up on the undeformed body, so that every option has been asked for."""
+        """Set the solvers up on the undeformed body, so that every option has been asked for."""
+        self.ts.setUp()
 
     def describe(self) -> str:
         """The method in words."""
@@ -93,7 +93,7 @@ class Integrator(ABC):
     def failed(self, goal: float, why: str) -> MotionStopped:
         """The error of a step that failed."""
         cure = "a smaller tolerance" if self.adaptive else "a smaller dynamics.step"
-        hint = '' if self.name == "energy_momentum" else ', or integrator = "energy_momentum"'
+        hint = "" if self.name == "energy_momentum" else ', or integrator = "energy_momentum"'
         return MotionStopped(
             f"{self.name} cannot go on from time {self.time:.6g} to {goal:.6g}: {why}; try {cure}{hint}"
         )

@@ -1,4 +1,4 @@
-"""Backward differentiation formulas of PETSc, order 1 or 2: higher ones are unstable for undamped structures."""
+"""Backward differentiation of PETSc, order 1 or 2: higher ones are unstable for undamped structures."""
 
 from __future__ import annotations
 

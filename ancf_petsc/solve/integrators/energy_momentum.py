@@ -1,7 +1,9 @@
-"""The energy-momentum step: Simo and Tarnow, ZAMP 43 (1992) 757; for any law by Gonzalez, CMAME 190 (2000) 1763.
+"""The energy-momentum step of Simo and Tarnow, ZAMP 43 (1992) 757.
 
-The midpoint rule with the law's discrete gradient: whatever the step, energy plus loss minus work, and both momenta of a free
-body, stay what they were, to the tolerance of Newton.
+For any law by the discrete gradient of Gonzalez, CMAME 190 (2000) 1763.
+
+The midpoint rule with the law's discrete gradient: whatever the step, energy plus loss minus work, and both
+momenta of a free body, stay what they were, to the tolerance of Newton.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ class EnergyMomentum(OneStep):
         for region in equations.assembly.model.regions:
             if region.mean_kernels is None:
                 raise CaseError(
-                    f"element {equations.assembly.model.element.code} with the law {region.law.name} has no discrete gradient",
+                    f"element {equations.assembly.model.element.code} with the law {region.law.name} "
+                    "has no discrete gradient",
                     key="dynamics.integrator",
                     got=self.name,
                     expected="a solid or plane element and a law with mean_stress and mean_tangent",
@@ -54,7 +57,7 @@ class EnergyMomentum(OneStep):
             self.x, self.between(d, 1.0), matrix, lambda: mass.add_to_matrix(factor)
         )
 
-    def finish(self, d: NDArray) -> dict[str, float]:
+    def finish(self, d: NDArray) -> tuple[float, float]:
         eq, v = self.equations, self.v.array_r.reshape(-1, 3)
         work = float(np.vdot(eq.loads(self.time + 0.5 * self.h), d))
         work += float(self._reactions @ d.ravel()[eq.assembly.driven])
@@ -62,4 +65,4 @@ class EnergyMomentum(OneStep):
         lost = eq.damping * self.h * float(np.vdot(middle, eq.mass.times(middle))) if eq.damping else 0.0
         self.v.array[:] = (2 * middle - v).ravel()
         total = eq.comm.allreduce(np.array([work, lost]))
-        return {"work": float(total[0]), "dissipated": float(total[1])}
+        return float(total[0]), float(total[1])

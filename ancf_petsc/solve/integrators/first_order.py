@@ -1,7 +1,7 @@
 """Motion as a system of first order, y = (x, v), for PETSc's methods of ordinary differential equations.
 
-The driven degrees of freedom of y rest: wherever forces are computed the ramps' own values at the time of the stage stand in
-their place, so every method keeps its order.
+The driven degrees of freedom of y rest: wherever forces are computed the ramps' own values at the time of
+the stage stand in their place, so every method keeps its order.
 """
 
 from __future__ import annotations

@@ -1,7 +1,9 @@
-"""Generalised alpha: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371, in the notation of Jansen, Whiting and Hulbert (2000).
+"""Generalised alpha: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371, in the notation of Jansen, Whiting
+and Hulbert (2000).
 
-The balance holds between the steps: accelerations at alpha_m, the rest at alpha_f. Second order; what the step does not
-resolve is damped, to the spectral radius. Starting accelerations come from the equations of motion.
+The balance holds between the steps: accelerations at alpha_m, the rest at alpha_f. Second order; what the
+step does not resolve is damped, to the spectral radius. Starting accelerations come from the equations of
+motion.
 """
 
 from __future__ import annotations
@@ -61,12 +63,9 @@ class GeneralizedAlpha(OneStep):
         mass = self.equations.mass
         self.equations.assembly.tangent(self.between(d, part), matrix, lambda: mass.add_to_matrix(factor))
 
-    def finish(self, d: NDArray) -> dict[str, float]:
+    def finish(self, d: NDArray) -> None:
         v1, self.a = self._ends(d)
         self.v.array[:] = v1.ravel()
-        return {}
 
     def describe(self) -> str:
         return f"{super().describe()}, spectral radius {self.settings.spectral_radius:g}"
-
-

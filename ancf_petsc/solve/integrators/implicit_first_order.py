@@ -1,7 +1,7 @@
 """Implicit methods of PETSc on y = (x, v): F = (x' - v, M (v' + alpha v) + Q(x) - Q_e(t)) = 0.
 
-PETSc asks for the solution of [shift, -1; K, (shift + alpha) M] (dx, dv) = (r, s). Eliminating dv leaves a system of the size
-of statics, K + shift (shift + alpha) M, which the linear solver of the tangent handles.
+PETSc asks for the solution of [shift, -1; K, (shift + alpha) M] (dx, dv) = (r, s). Eliminating dv leaves a
+system of the size of statics, K + shift (shift + alpha) M, which the linear solver of the tangent handles.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ from ancf_petsc.solve.petsc import default_options
 
 
 class ImplicitFirstOrder(FirstOrder):
-    """A subclass names PETSc's type and its options. keeps_matrix: whether Newton mends what an old matrix does badly."""
+    """A subclass names PETSc's type and its options. keeps_matrix: whether Newton mends what an old matrix
+    does badly.
+    """
 
     type_name: str
     keeps_matrix = True
@@ -31,7 +33,9 @@ class ImplicitFirstOrder(FirstOrder):
         super().__init__(equations, settings, x, v)
         self.matrix = equations.assembly.create_matrix()
         self._eliminated = _Eliminated(self)
-        self.jacobian = PETSc.Mat().createPython((self.y.getSizes(),) * 2, self._eliminated, comm=equations.comm)
+        self.jacobian = PETSc.Mat().createPython(
+            (self.y.getSizes(),) * 2, self._eliminated, comm=equations.comm
+        )
         self.jacobian.setUp()
         self.test = ForceTest(equations, x)
         self.ts.setType(self.type_name)

@@ -1,4 +1,5 @@
-"""Newton for the increment d = x1 - x0 of one implicit step: free of the rounding a position as unknown would bring.
+"""Newton for the increment d = x1 - x0 of one implicit step: free of the rounding a position as unknown
+would bring.
 
 A factored matrix is kept from iteration to iteration and from step to step as long as it does its work.
 """
@@ -32,14 +33,16 @@ WORDS = {
 
 @dataclass(frozen=True)
 class Forces:
-    """Out-of-balance force (n, 3) with the values on driven nodal vectors left in, and the squared force scale here."""
+    """Out-of-balance force (n, 3) with the values on driven nodal vectors left in, and the squared force
+    scale here.
+    """
 
     values: NDArray[np.float64]
     scale: float
 
 
 class ForceTest:
-    """Convergence: out-of-balance force against the largest force at work. Tells whether the matrix has aged."""
+    """Convergence: out-of-balance force against the forces at work. Tells whether the matrix has aged."""
 
     def __init__(self, equations: Equations, x: PETSc.Vec) -> None:
         self.equations, self.x = equations, x
@@ -69,7 +72,8 @@ class ForceTest:
 class IncrementSolver:
     """Solves forces(d) = 0 on the free degrees of freedom; d carries the increments of the driven ones.
 
-    x: the state. forces(d) -> Forces. tangent(d, matrix) fills the matrix with the derivative. relative: the tolerance.
+    x: the state. forces(d) -> Forces. tangent(d, matrix) fills the matrix with the derivative. relative:
+    the tolerance.
     """
 
     def __init__(
@@ -110,7 +114,9 @@ class IncrementSolver:
         return snes
 
     def solve(self, guess: NDArray) -> str | None:
-        """Start from guess (n, 3); the answer is in `d`. Returns None, or in words why there is none. Collective."""
+        """Start from guess (n, 3); the answer is in `d`. Returns None, or in words why there is none.
+        Collective.
+        """
         self.newton = self.linear_iterations = 0
         self.d.array[:] = guess.ravel()
         reason = self._run(self._quick)

@@ -1,4 +1,6 @@
-"""Implicit methods of one step and one unknown, the increment of positions: PETSc's TS of type python with a SNES of its own."""
+"""Implicit methods of one step and one unknown, the increment of positions: PETSc's TS of type python with
+a SNES of its own.
+"""
 
 from __future__ import annotations
 
@@ -45,6 +47,7 @@ class OneStep(Integrator):
         self.ts.setSolution(x)
         self.ts.setFromOptions()
         self._why: str | None = None
+        self._known: tuple[float, float] | None = None
         self._size = 0.0
 
     @abstractmethod
@@ -56,10 +59,10 @@ class OneStep(Integrator):
         """Fill the matrix with the derivative of `forces`."""
 
     @abstractmethod
-    def finish(self, d: NDArray) -> dict[str, float]:
+    def finish(self, d: NDArray) -> tuple[float, float] | None:
         """Enter velocities (and accelerations) after the increment d (n, 3), positions unchanged yet.
 
-        Returns what the step knows exactly: work, dissipated.
+        Returns external work and loss where the method has them exactly.
         """
 
     def advance(self, goal: float) -> Step:
@@ -71,7 +74,7 @@ class OneStep(Integrator):
         if self._why is not None:
             raise self.failed(goal, self._why)
         self.time = goal
-        return Step(goal, self.h, self.solver.newton, self.solver.linear_iterations, **self._known)
+        return Step(goal, self.h, self.solver.newton, self.solver.linear_iterations, known=self._known)
 
     def set_solver_up(self) -> None:
         self.h = self.goal = self.settings.step

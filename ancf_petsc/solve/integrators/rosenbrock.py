@@ -1,4 +1,6 @@
-"""Rosenbrock-W of PETSc, type ra34pw2 (Rang and Angermann 2005): order 3, four linear solves a step with one factor, no Newton."""
+"""Rosenbrock-W of PETSc, type ra34pw2 (Rang and Angermann 2005): order 3, four linear solves a step with
+one factor, no Newton.
+"""
 
 from __future__ import annotations
 

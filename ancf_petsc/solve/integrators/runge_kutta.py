@@ -1,4 +1,6 @@
-"""Explicit Runge-Kutta methods of PETSc: 5dp (Dormand and Prince 1980, the paper's ode45) and the classical one of order 4."""
+"""Explicit Runge-Kutta methods of PETSc: 5dp (Dormand and Prince 1980, the paper's ode45) and the classical
+one of order 4.
+"""
 
 from __future__ import annotations
 
