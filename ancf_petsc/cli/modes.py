@@ -38,7 +38,9 @@ def execute(arguments: argparse.Namespace) -> int:
     read = on_root(comm, lambda: load_case(arguments.case, changes(arguments), arguments.petsc_options))
     case = comm.bcast(read)
     folder = arguments.out or Path("results") / f"{case.name}_modes"
-    rows = find_modes(case, folder, arguments.count, loaded=arguments.loaded, force=arguments.force, comm=comm)
+    rows = find_modes(
+        case, folder, arguments.count, loaded=arguments.loaded, force=arguments.force, comm=comm
+    )
     if comm.rank == 0:
         title = "modes of the body under its loads" if arguments.loaded else "modes of the unloaded body"
         columns = ("mode", "frequency", "period", "omega", "alpha = 4 pi / T")
