@@ -1,7 +1,7 @@
 """The measurements: each takes the ranks and a task's arguments and returns samples, error and facts.
 
-samples: one value a repetition, in the unit of the catalogue's row. error: distance from the known answer, None where
-there is none for this mesh. Every measurement is collective; what it returns counts on the root rank.
+samples: one value a repetition, in the unit of the catalogue's row. error: distance from the known answer,
+None where there is none for this mesh. Every measurement is collective.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ EVALUATIONS = {"central_difference": 1, "runge_kutta_4": 4, "runge_kutta_5dp": 6
 
 
 def yardstick(comm: MPI.Comm, *, mesh: str, repetitions: int) -> Result:
-    """Memory bandwidth in GB/s; gather and scatter in ns an element, numbered as the solver numbers the mesh."""
+    """Memory bandwidth in GB/s; gather and scatter in ns an element, on the solver's numbering."""
     on_root(comm, lambda: mesh_path(mesh))
     case = case_from_dict(block(mesh, 0.001, 1), Path.cwd(), "yardstick")
     model = build(case, MPI.COMM_SELF).model
@@ -88,7 +88,7 @@ def set_up(comm: MPI.Comm, *, problem: dict[str, Any], repetitions: int) -> Resu
     volume, kinds = 0.0, element(case.spec.mesh.element).kinds
     for _ in range(repetitions):
         clock = _Splits(comm, seconds)
-        mesh = on_root(comm, lambda: read_mesh(case.mesh_file, kinds))
+        mesh: Any = on_root(comm, lambda: read_mesh(case.mesh_file, kinds))
         clock.split("read")
         blueprint = on_root(comm, partial(draw_on, case, mesh))
         clock.split("tables")
@@ -105,7 +105,7 @@ def set_up(comm: MPI.Comm, *, problem: dict[str, Any], repetitions: int) -> Resu
 
 
 def stroke(comm: MPI.Comm, *, problem: dict[str, Any], repetitions: int) -> Result:
-    """How far the body can be pressed: the last stroke with an equilibrium, and why there is none further on."""
+    """How far the body can be pressed: the last stroke with an equilibrium, and why it is the last."""
     case = _case(comm, problem)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(comm.bcast(place)) / "run"
@@ -137,7 +137,7 @@ class _Splits:
 def _case(comm: MPI.Comm, problem: dict[str, Any]) -> Case:
     """The case of {"name": of a problem, and its arguments}; its mesh is made where it is missing."""
     arguments = dict(problem)
-    maker = PROBLEMS[arguments.pop("name")]
+    maker: Any = PROBLEMS[arguments.pop("name")]
     return comm.bcast(on_root(comm, lambda: case_from_dict(maker(**arguments), Path.cwd(), "benchmark")))
 
 

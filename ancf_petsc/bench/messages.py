@@ -18,7 +18,7 @@ SMALL, LARGE, ROUNDS = 8, 2**23, 200
 
 
 def messages(comm: MPI.Comm, *, mesh: str, repetitions: int) -> dict[str, Any]:
-    """The most ghosts, neighbours and elements over its share that a rank has where a mesh is divided among all."""
+    """The most ghosts, neighbours and elements over its share that a rank has of a divided mesh."""
     case = comm.bcast(on_root(comm, lambda: case_from_dict(block(mesh, 0.001, 1), ".", "block")))
     built = build_from(case, on_root(comm, lambda: draw(case)), comm)
     model = built.model

@@ -12,9 +12,9 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from ancf_petsc.bench.catalog import CUBE_74K, CUBE_480K, Row
 from ancf_petsc.bench.machine import commit, machine, now
 from ancf_petsc.bench.meshes import PROJECT
+from ancf_petsc.bench.row import CUBE_74K, CUBE_480K, Row
 from ancf_petsc.launcher import environment, on_ranks
 
 LONGEST = 3600.0
@@ -80,8 +80,8 @@ def _measured(row: Row, repetitions: int | None) -> Result:
     return launch(row.measure, {**row.task, "repetitions": count}, ranks=row.ranks)
 
 
-def _started(words: Sequence[str], repetitions: int, until: str = "") -> Result:
-    """Seconds from the command until it prints `until`, or ends; one start before warms the caches."""
+def _started(words: Sequence[str], until: str, repetitions: int) -> Result:
+    """Seconds from the command until it prints `until`; one start before warms the caches."""
     samples = []
     with tempfile.TemporaryDirectory() as place:
         out = ["--out", place] if words[0] == "run" else []
@@ -91,8 +91,8 @@ def _started(words: Sequence[str], repetitions: int, until: str = "") -> Result:
             with subprocess.Popen(
                 command, stdout=subprocess.PIPE, text=True, cwd=PROJECT, env=environment()
             ) as process:
-                lines = process.stdout or []
-                spoke = any(until in line for line in lines) if until else len(list(lines)) > 0
+                assert process.stdout is not None
+                spoke = any(until in line for line in process.stdout)
                 samples.append(time.perf_counter() - begun)
                 process.terminate()
             if not spoke:
@@ -118,7 +118,7 @@ def _derived(row: Row, results: dict[str, Result], measured: dict[str, Any]) -> 
 
 
 def judged(row: Row, result: Result) -> Result:
-    """The result with median, spread (half the range over the median), whether it is right and met its target.
+    """The result with median, spread (half the range over it), whether it is right and met its target.
 
     An answer that is wrong meets no target; one that nobody knows is no error.
     """

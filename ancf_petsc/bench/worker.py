@@ -1,6 +1,6 @@
-"""What a benchmark's process does: `python -m ancf_petsc.bench.worker TASK.json RESULT.json`, on any number of ranks.
+"""What a benchmark's process does: `python -m ancf_petsc.bench.worker TASK.json RESULT.json`, on any ranks.
 
-The task is a measurement's name and its arguments, the result what the measurement returns or the problem it met.
+The task is a measurement's name and its arguments, the result what it returns or the problem it met.
 """
 
 from __future__ import annotations

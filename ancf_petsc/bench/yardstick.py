@@ -23,7 +23,7 @@ def copy(source, into):
 
 @kernel
 def gather_scatter(positions, cells, force):
-    """Read positions (v, 3) of each cell's nodes, add their sum to force (v, 3): a residual without arithmetic."""
+    """Read positions (v, 3) of a cell's nodes, add their sum to force (v, 3): a residual unreckoned."""
     for e in range(cells.shape[0]):
         x = y = z = 0.0
         for a in range(cells.shape[1]):

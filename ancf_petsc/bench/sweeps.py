@@ -1,0 +1,100 @@
+"""The benchmarks without a target: the charts and the model of scaling in docs/performance.md."""
+
+from __future__ import annotations
+
+from ancf_petsc.bench.row import CUBE_74K, Row, press
+
+
+def _accuracy() -> list[Row]:
+    """The PVC block's force at 25 mm over mesh sizes and elements, both laws."""
+    meshes = {
+        "3413": [f"pvc_block:{size}" for size in ("0.02", "0.014", "0.01", "0.007", "0.005", "0.0035")],
+        "3-10-1-3": [f"pvc_block:{size}:quadratic" for size in ("0.03", "0.02", "0.014", "0.01")],
+        "3813": [f"pvc_block:{bricks}:hexahedra" for bricks in ("2x4x10", "4x8x20", "8x16x40")],
+        "3-20-1-3": [f"pvc_block:{bricks}:hexahedra" for bricks in ("2x4x10", "3x6x10", "4x8x20")],
+        "3843": [f"pvc_block:{bricks}:hexahedra" for bricks in ("2x4x10", "3x6x10", "4x8x20")],
+    }
+    return [
+        Row(
+            f"accuracy/{law}/{element}/{mesh}",
+            "force of the PVC block at 25 mm",
+            "run",
+            press(
+                {
+                    "name": "block",
+                    "mesh": mesh,
+                    "stroke": 0.025,
+                    "steps": 5,
+                    "law": law,
+                    "element": element,
+                },
+                {},
+            ),
+            repetitions=2,
+        )
+        for law in ("svk", "neo_hooke")
+        for element, names in meshes.items()
+        for mesh in names
+    ]
+
+
+def _strokes() -> list[Row]:
+    """How far each law lets the cube and the PVC block be pressed, against mesh size."""
+    meshes = {
+        "cube": ("0.02", "0.0125", "0.008", "0.005", "0.0035", "0.0025"),
+        "pvc_block": ("0.02", "0.014", "0.01", "0.007", "0.005"),
+    }
+    return [
+        Row(
+            f"stroke/{law}/{body}:{size}",
+            "stroke at which no equilibrium is found further on",
+            "stroke",
+            {
+                "problem": {
+                    "name": "block",
+                    "mesh": f"{body}:{size}",
+                    "stroke": 0.08,
+                    "steps": 80,
+                    "law": law,
+                    "smallest_step": 1e-5,
+                }
+            },
+            unit="m",
+            repetitions=1,
+        )
+        for law in ("svk", "neo_hooke")
+        for body, sizes in meshes.items()
+        for size in sizes
+    ]
+
+
+def _scaling() -> list[Row]:
+    """Weak scaling: half the elements on one rank. What travels: counted to 16 ranks, timed between 2."""
+    weak = {"37k": ("cube:0.0032", 1, 0.010), "240k": ("cube:0.0017", 1, 0.005)}
+    rows = [
+        Row(
+            f"scaling/weak/{name}",
+            f"block of about {name} elements on one rank, half of what two ranks have",
+            "run",
+            press({"name": "block", "mesh": mesh, "stroke": stroke, "steps": 10}, {}),
+            ranks=ranks,
+            repetitions=3,
+        )
+        for name, (mesh, ranks, stroke) in weak.items()
+    ]
+    rows += [
+        Row(
+            f"scaling/messages/{ranks}",
+            f"ghosts and neighbours where 73,606 elements are divided among {ranks} ranks",
+            "messages",
+            {"mesh": CUBE_74K},
+            unit="ghosts",
+            ranks=ranks,
+            repetitions=1,
+        )
+        for ranks in (2, 4, 8, 16)
+    ]
+    return [*rows, Row("scaling/exchange", "a small message", "exchange_cost", unit="us", ranks=2)]
+
+
+SWEEPS = [*_accuracy(), *_strokes(), *_scaling()]

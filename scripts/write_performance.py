@@ -1,0 +1,269 @@
+#!/usr/bin/env python3
+"""Writes docs/performance.md and its charts from docs/benchmarks/*.json. All numbers in it come from there.
+
+    ancf bench --json docs/benchmarks/bench.json                            # 20 minutes on two quiet cores
+    ancf bench accuracy stroke scaling --json docs/benchmarks/sweeps.json
+    scripts/bench_peers.py --json docs/benchmarks/peers.json
+    scripts/write_performance.py
+
+What is known about a miss beside its numbers stands in docs/benchmarks/notes.toml, a line for each benchmark.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tomllib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from performance_charts import best_forces, draw_accuracy, draw_strokes, sweep
+from scaling_model import Model
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+STORE = DOCS / "benchmarks"
+PARTS = ("read", "setup", "solve", "output")
+STRONG = {"block_74k": "block_74k_one", "block_480k": "block_480k_one"}
+WEAK = {"scaling/weak/37k": "block_74k", "scaling/weak/240k": "block_480k"}
+MANY = (1, 2, 16, 256, 4096)
+Report = dict[str, Any]
+
+
+def main() -> int:
+    bench, sweeps, peers = (load(name) for name in ("bench", "sweeps", "peers"))
+    if not bench:
+        print(
+            "error: docs/benchmarks/bench.json is missing: ancf bench --json docs/benchmarks/bench.json",
+            file=sys.stderr,
+        )
+        return 2
+    results = {**bench["results"], **sweeps.get("results", {})}
+    pieces = [*head(bench), *targets(bench["results"]), *misses(bench["results"])]
+    pieces += [*side_by_side(peers), *charts(results), *scaling(results)]
+    (DOCS / "performance.md").write_text("\n".join(pieces) + "\n")
+    print(DOCS / "performance.md")
+    return 0
+
+
+def load(name: str) -> Report:
+    """A report that was measured, empty where there is none."""
+    file = STORE / f"{name}.json"
+    return json.loads(file.read_text()) if file.is_file() else {}
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    return [*lines, *("| " + " | ".join(map(written, row)) + " |" for row in rows), ""]
+
+
+def written(value: object) -> str:
+    return "" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def where(report: Report) -> str:
+    """Machine, versions, commit, date in one line."""
+    machine = report["machine"]
+    parts = [f"{machine['processor']}, {machine['cores']} cores, {machine['memory_gb']} GB"]
+    parts += [f"{name} {number}" for name, number in report.get("versions", {}).items() if name != "machine"]
+    return f"{', '.join(parts)}; commit {report['commit'] or 'unknown'}, {report['date']}, load before {machine['load_before']}"
+
+
+def head(bench: Report) -> list[str]:
+    lines = [
+        "# Performance",
+        "",
+        "Written by `scripts/write_performance.py` from `docs/benchmarks/`; measured by `ancf bench`.",
+        "",
+    ]
+    lines += [
+        "Median of repetitions after warming up, spread is half the range. Every run checks its answer.",
+        "",
+    ]
+    lines += [
+        f"Machine: {where(bench)}.",
+        "",
+        "Yardstick of the machine in the same run, on one process and on two at once:",
+        "",
+    ]
+    rows = [
+        (mesh, *found["copy_gb_s"], found["copy_gain"], *found["gather_scatter_ns"], found["gather_gain"])
+        for mesh, found in bench["yardstick"].items()
+    ]
+    heads = ("mesh", "copy GB/s, 1", "2", "gain", "gather and scatter ns/element, 1", "2", "gain")
+    return lines + table(heads, rows)
+
+
+def verdict(result: Report) -> str:
+    if "problem" in result:
+        return "cannot run"
+    if result["right"] is False:
+        return "**wrong**"
+    return {True: "met", False: "**missed**", None: ""}[result["met"]]
+
+
+def targets(results: Report) -> list[str]:
+    """The table of what was wanted and what was measured."""
+    rows = []
+    for name, result in results.items():
+        if result["target"] is None:
+            continue
+        spread = f"{100 * result['spread']:.0f} %" if "spread" in result else None
+        middle, bound = result.get("median"), "at least" if result["unit"] == "times" else "at most"
+        rows.append(
+            (f"`{name}`", result["about"], middle, f"{bound} {result['target']:.3g}", result["unit"], spread)
+            + (result.get("error"), verdict(result))
+        )
+    heads = ("benchmark", "what", "measured", "wanted", "unit", "spread", "error of the answer", "")
+    return ["## Targets", "", *table(heads, rows)]
+
+
+def misses(results: Report) -> list[str]:
+    """What the time of each missed target is spent on."""
+    file = STORE / "notes.toml"
+    notes = tomllib.loads(file.read_text()) if file.is_file() else {}
+    lines = []
+    for name, result in results.items():
+        if result["target"] is None or result["met"]:
+            continue
+        said = [result["problem"]] if "problem" in result else spent(result)
+        lines.append(f"- `{name}`: {'; '.join([*said, *([notes[name]] if name in notes else [])])}.")
+    return ["## Misses", "", *(lines or ["None."]), ""]
+
+
+def spent(result: Report) -> list[str]:
+    """Parts of the time, of the last repetition, and work done."""
+    facts = result.get("facts", {})
+    seconds = facts.get("seconds", {})
+    shown = [f"{part} {last(seconds[part]):.3g} s" for part in seconds if part not in ("import", "total")]
+    counts = facts.get("iterations", {})
+    work = [f"{counts['newton']} Newton and {counts['linear']} linear iterations"] if counts else []
+    return [", ".join(shown)] * bool(shown) + work
+
+
+def last(value: float | list[float]) -> float:
+    return value[-1] if isinstance(value, list) else value
+
+
+def side_by_side(peers: Report) -> list[str]:
+    """Other programs on the same problems in one run."""
+    if not peers:
+        return []
+    lines = [
+        "## Beside other programs",
+        "",
+        f"`scripts/bench_peers.py`, {peers['ranks']} ranks or threads. {where(peers)}.",
+        "",
+    ]
+    rows = []
+    for size, found in peers["results"].items():
+        for name, run in found["programs"].items():
+            seconds = run.get("median")
+            difference = run.get("difference")
+            about = run.get("problem") or ", ".join(f"{part} {t:.3g}" for part, t in run["seconds"].items())
+            rows.append((f"{size}: {found['elements']}", name, seconds, run.get("ratio"), difference, about))
+    heads = ("elements", "program", "seconds", "times ancf_petsc", "difference of force", "parts, s")
+    lines += table(heads, rows)
+    for size, found in peers["results"].items():
+        ratio = found["best_peer_ratio"]
+        if ratio is not None:
+            lines.append(
+                f"- {size}: the faster peer takes {ratio:.2f} times as long; wanted 7: {'met' if ratio >= 7 else '**missed**'}."
+            )
+    return [*lines, ""]
+
+
+def charts(results: Report) -> list[str]:
+    lines = []
+    if sweep(results, "accuracy"):
+        draw_accuracy(results, STORE / "accuracy.png")
+        best = [f"{law} {1e-3 * force:.6g} kN ({run})" for law, (force, run) in best_forces(results).items()]
+        lines += [
+            "## Speed against accuracy",
+            "",
+            "![Error of the force against seconds](benchmarks/accuracy.png)",
+            "",
+        ]
+        lines += [
+            f"Errors are against the finest run of quadratic elements, of the quarter: {', '.join(best)}.",
+            "",
+        ]
+    if sweep(results, "stroke"):
+        draw_strokes(results, STORE / "stroke.png")
+        lines += [
+            "## Where the method fails",
+            "",
+            "![Stroke that is reached against mesh size](benchmarks/stroke.png)",
+            "",
+        ]
+        lines += ["A triangle: the path went on to the end that was asked for, 80 mm.", ""]
+        rows = [
+            (*rest, 1e3 * found["median"], found["facts"]["why"])
+            for rest, found in sweep(results, "stroke").items()
+        ]
+        lines += table(("law", "mesh", "stroke, mm", "why it ends"), rows)
+    return lines
+
+
+def scaling(results: Report) -> list[str]:
+    """One rank and two, and the model of many."""
+    strong = [
+        (two, results[one]["median"], results[two]["median"])
+        for two, one in STRONG.items()
+        if both(results, one, two)
+    ]
+    weak = [
+        (f"{one} / {two}", results[one]["median"], results[two]["median"])
+        for one, two in WEAK.items()
+        if both(results, one, two)
+    ]
+    rows = [(name, one, two, one / two, "times faster") for name, one, two in strong]
+    rows += [(name, one, two, one / two, "of one rank's speed kept") for name, one, two in weak]
+    lines = (
+        ["## Scaling", "", *table(("problem", "one rank, s", "two ranks, s", "", ""), rows)] if rows else []
+    )
+    needed = ("setup_480k", "scaling/exchange", "scaling/messages/16", "block_480k")
+    if not both(results, *needed):
+        return lines
+    model = Model(results, "block_480k")
+    lines += ["### What to expect on more ranks", "", *model_words(model)]
+    shares = [(f"{model.elements} elements", model.elements, 0), ("240,000 elements a rank", 0, 240_000)]
+    for title, fixed, each in shares:
+        parts = [model.parts(fixed or each * ranks, ranks) for ranks in MANY]
+        rows = [
+            (p.ranks, p.serial, p.shared, p.messages, p.sums, p.total, efficiency(parts[0], p)) for p in parts
+        ]
+        heads = (
+            "ranks",
+            "root alone, s",
+            "shared work, s",
+            "messages, s",
+            "sums, s",
+            "together, s",
+            "efficiency",
+        )
+        lines += [f"{title}:", "", *table(heads, rows)]
+    return [*lines, "`scripts/cluster.slurm` starts a run on a cluster."]
+
+
+def both(results: Report, *names: str) -> bool:
+    return all("median" in results.get(name, {}) for name in names)
+
+
+def efficiency(one: Any, many: Any) -> float:
+    """Work done a rank and second, over that of one rank."""
+    return (many.elements / many.total / many.ranks) / (one.elements / one.total)
+
+
+def model_words(model: Model) -> list[str]:
+    words = f"""\
+A model (`scripts/scaling_model.py`), no measurement: work and iterations ({model.iterations}) as in `block_480k` on two ranks,
+{1e6 * model.work:.3g} us an element; reading and tables by the root rank {1e6 * model.serial:.3g} us an element; ghosts
+{model.ghost_factor:.3g} (nodes / rank)^(2/3) and up to {model.neighbour_limit:.3g} neighbours, fitted to meshes divided among 2 to 16
+ranks; messages {1e6 * model.latency:.3g} us and {model.bandwidth / 1e9:.3g} GB/s, sums {1e6 * model.sum_time:.3g} us, timed between two
+processes of this machine: a cluster's network has its own. Iterations are taken not to grow."""
+    return [words, ""]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
