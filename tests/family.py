@@ -51,7 +51,9 @@ def unit_cube(code: str, n: int, folder: Path, *, odd: bool = False) -> Path:
     if kind == "quad":
         x, y = np.meshgrid(steps[0], steps[1])
         index = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
-        cells = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+        cells = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(
+            -1, 4
+        )
         points = np.stack((x.ravel(), y.ravel(), np.zeros(x.size)), axis=1)
     else:
         z, y, x = np.meshgrid(*steps[::-1], indexing="ij")

@@ -69,7 +69,9 @@ class Manufactured:
         self.body = held_all_around(code, unit_cube(code, n, folder), folder, "neo_hooke")
         model = self.body.model
         corners = model.reference[model.position_cells()[:, : len(row.cell.corners)]]
-        slopes = model.reference[model.cells[:, row.slot > 0]].reshape(len(corners), -1, row.cell.dimension, 3)
+        slopes = model.reference[model.cells[:, row.slot > 0]].reshape(
+            len(corners), -1, row.cell.dimension, 3
+        )
         tables = make_tables(row, model.cells, corners, directions=slopes, quadrature="exact")
         _, self.maps, self.volumes, reference = tables
         self.weights, self.row, self.model = reference.weights, row, model

@@ -114,7 +114,7 @@ def turn_functions(values: Floats, maps: Floats, element: Element) -> Floats:
     if s:
         by_node = turned[:, : s * (d + 1)].reshape(e, s, d + 1)
         by_node[..., 1:] = np.einsum("esmk,esk->esm", maps[..., :d, :d], by_node[..., 1:])
-        turned[:, : s * (d + 1)] = by_node.reshape(e, -1)
+        turned[:, : s * (d + 1)] = by_node.reshape(e, s * (d + 1))
     return turned
 
 
