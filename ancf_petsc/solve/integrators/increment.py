@@ -50,6 +50,10 @@ class ForceTest:
         self.aged = True
         self._before = np.inf
 
+    def begin(self) -> None:
+        """A new solve begins with a residual that nothing compares with."""
+        self._before = np.inf
+
     def note_scale(self, squared: float) -> None:
         """The squared norm of the forces on this rank, of the residual computed last."""
         self.scale = squared
