@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Computes again what is claimed of motions and prints it beside its target. Two minutes: scripts/verify_dynamics.py"""
+"""Computes again what is claimed of motions and prints it beside its target. Takes two minutes."""
 
 from __future__ import annotations
 

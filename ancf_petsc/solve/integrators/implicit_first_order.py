@@ -19,7 +19,6 @@ from ancf_petsc.solve.integrators.increment import MOST_ITERATIONS, ForceTest
 from ancf_petsc.solve.linear import LinearSolver
 from ancf_petsc.solve.petsc import default_options
 
-
 SAME_SHIFT = 1e-9  # relative: equal steps differ by rounding
 
 
