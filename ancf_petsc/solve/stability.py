@@ -14,7 +14,7 @@ LARGEST_TO_FACTOR = 300_000
 
 
 def weakest_cell(assembly: Assembly, x: PETSc.Vec) -> tuple[float, float, int, np.ndarray, str]:
-    """Smallest principal stretch over all cells, with its det F, the cell's number, its undeformed centroid, its law."""
+    """Smallest principal stretch of all cells, with det F, the cell's number, its undeformed centroid, its law."""
     model = assembly.model
     strain, _, det = assembly.fields(x)
     stretch = np.sqrt(np.maximum(np.linalg.eigvalsh(2 * strain.reshape(-1, 3, 3) + np.eye(3))[:, 0], 0.0))
@@ -37,7 +37,8 @@ def why_it_ends(newton: Newton, x: PETSc.Vec, s: float, reason: str, smallest_st
         pivots = negative_pivots_of(newton.matrix)
     place = ", ".join(f"{c:.6g}" for c in centroid)
     line = (
-        f"no equilibrium beyond pseudo-time {s:.6g}: steps of {smallest_step:g} still fail ({reason}); {_definiteness(pivots)}; "
+        f"no equilibrium beyond pseudo-time {s:.6g}: steps of {smallest_step:g} still fail ({reason}); "
+        f"{_definiteness(pivots)}; "
         f"weakest element {cell} at ({place}): smallest stretch {stretch:.3f}, det F {det:.3f}"
     )
     return f"{line}; {_cure(law, stretch, pivots)}"
@@ -54,8 +55,8 @@ def _definiteness(pivots: int | None) -> str:
 def _cure(law: str, stretch: float, pivots: int | None) -> str:
     if law == "svk" and stretch < SVK_LIMIT + 0.1:
         return (
-            f"svk carries no more force below a stretch of {SVK_LIMIT:.3f}: the path ends here whatever the step "
-            'size, and sooner on finer meshes; law = "neo_hooke" goes on'
+            f"svk carries no more force below a stretch of {SVK_LIMIT:.3f}: the path ends here whatever the "
+            'step size, and sooner on finer meshes; law = "neo_hooke" goes on'
         )
     if pivots:
         return "the body buckles or folds here: smaller loads, other supports, or damped dynamics go past it"
