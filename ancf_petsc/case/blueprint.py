@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -302,7 +304,7 @@ class _Drawer:
         return self.space.shares(self.element.cell.dimension - 1, faces)
 
 
-def output_times(spec: CaseSpec, file: object = None) -> list[float]:
+def output_times(spec: CaseSpec, file: Path | None = None) -> list[float]:
     """Pseudo-times of the outputs of a static case, ascending, the last is 1."""
     statics = spec.statics
     assert statics is not None
@@ -310,15 +312,17 @@ def output_times(spec: CaseSpec, file: object = None) -> list[float]:
         return sorted({*statics.times, 1.0})
     if statics.strokes:
         return sorted({*_stroke_times(spec, statics.strokes, file), 1.0})
+    assert statics.steps
     return [k / statics.steps for k in range(1, statics.steps + 1)]
 
 
-def _stroke_times(spec: CaseSpec, strokes: tuple[float, ...], file: object) -> list[float]:
+def _stroke_times(spec: CaseSpec, strokes: tuple[float, ...], file: Path | None) -> list[float]:
     """When the ramp of the driven group first reaches each stroke."""
     curve = spec.output.curve
     assert curve is not None
-    driver = next(c for c in spec.constraint if c.group == curve.stroke.group and curve.stroke.axis in c.move)
-    amplitude = abs(driver.move[curve.stroke.axis])
+    axis: Any = curve.stroke.axis
+    driver = next(c for c in spec.constraint if c.group == curve.stroke.group and axis in c.move)
+    amplitude = abs(driver.move[axis])
     ramp = make_ramp(driver.ramp, "linear")
     times = []
     for stroke in strokes:

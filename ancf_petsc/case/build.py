@@ -174,6 +174,8 @@ def _parameters(row: Element, law: Law, material: MaterialSpec, spec: CaseSpec) 
     """Of the law in the body's state: in space, in plane strain or stress, in a beam."""
     section = spec.section
     if row.is_beam and section:
+        assert section.inertia
+        assert section.area
         return material.young * np.array([1.0, section.inertia / section.area])
     parameters = law.parameters(material.young, material.poisson)
     return plane_stress(parameters) if section and section.plane == "stress" else parameters
@@ -211,7 +213,8 @@ def nodal_mass(model: Model) -> NDArray[np.float64]:
     tables = model.element.tables("mass")
     means = model.turned(tables.weights @ tables.values / tables.weights.sum())
     share = (density * model.volumes)[:, None] * means
-    return np.bincount(model.cells.ravel(), share.ravel(), minlength=len(model.reference))[: model.owned]
+    sums = np.bincount(model.cells.ravel(), share.ravel(), minlength=len(model.reference))
+    return sums[: model.owned].astype(float)
 
 
 def _file_order(plan: Blueprint | None, rows: _Rows, model: Model) -> FileOrder:

@@ -114,14 +114,14 @@ class Record:
         return {name: symmetry * value for name, value in whole.items()}
 
     def _reactions(self, out_of_balance: NDArray) -> dict[str, float]:
-        columns = {}
+        columns: dict[str, float] = {}
         for group in dict.fromkeys(spec.group for spec in self.spec.constraint):
             total = self.spec.output.symmetry * reaction(self.assembly, out_of_balance, group)
             columns |= {f"{group}.r{axis}": total[i] for i, axis in enumerate(AXES)}
         return columns
 
     def _probes(self, x: PETSc.Vec) -> dict[str, float]:
-        columns = {}
+        columns: dict[str, float] = {}
         for probe in self.spec.probe:
             position, displacement = mean_position(self.assembly, x, f"probe {probe.name}")
             columns |= {f"{probe.name}.{axis}": position[i] for i, axis in enumerate(AXES)}

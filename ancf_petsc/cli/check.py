@@ -114,6 +114,7 @@ def _analysis(case: Case) -> str:
     if case.spec.statics:
         return f"statics, {len(output_times(case.spec, case.file))} outputs after the start"
     motion = case.spec.dynamics
+    assert motion is not None
     return (
         f"dynamics by {motion.integrator} over {motion.duration:g}, {motion.outputs} outputs after the start"
     )

@@ -6,6 +6,7 @@ force . (r1 - r0) is the growth of the strain energy and forces and moments bala
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
@@ -18,8 +19,8 @@ from ancf_petsc.material.tensor import add, determinant, scale
 class MeanKernels(NamedTuple):
     """The compiled loops of one element and one law."""
 
-    force: object
-    tangent: object
+    force: Callable
+    tangent: Callable
 
 
 @cache

@@ -33,6 +33,7 @@ def make_mean_kernels(law: Law) -> MeanKernels:
 
 def _force(law: Law) -> Callable:
     stress = law.mean_stress
+    assert stress is not None
 
     @kernel
     def force(positions_0, positions_1, cells, maps, volumes, reference, parameters, first, last, result):
@@ -69,6 +70,7 @@ def add_row(values, rows, a, nodes, starts, strides, split, driven):
 
 def _tangent(law: Law) -> Callable:
     block_of = law.mean_tangent
+    assert block_of is not None
 
     @kernel
     def tangent(

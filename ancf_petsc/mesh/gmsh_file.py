@@ -116,10 +116,8 @@ def _blocks(found: dict[str, Any], names: Names, *, old: bool) -> list[Block]:
             membership[dimension, abs(entity)].append(_name(names, dimension, tag))
     blocks = []
     for dimension, entity, number, title, cells, nodes in found["elements"]:
-        if old:
-            groups = [_name(names, dimension, abs(entity))] if entity else []
-        else:
-            groups = membership[dimension, abs(entity)]
+        physical = [_name(names, dimension, abs(entity))] if entity else []
+        groups = physical if old else membership[dimension, abs(entity)]
         kind = BY_GMSH.get(number)
         nodes = nodes.astype(np.int64).reshape(len(cells), -1)
         if kind and kind.gmsh_order:

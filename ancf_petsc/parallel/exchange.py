@@ -87,7 +87,7 @@ def scatter_rows(comm: MPI.Comm, table: NDArray | None) -> NDArray:
     destination = (
         np.repeat(np.arange(comm.size), np.diff(bounds)) if comm.rank == 0 else np.empty(0, np.int64)
     )
-    rows = table if comm.rank == 0 else np.empty((0, *shape[1:]), dtype)
+    rows = np.empty((0, *shape[1:]), dtype) if table is None else table
     return exchange(comm, destination, rows)[0]
 
 
@@ -105,6 +105,14 @@ def lookup(comm: MPI.Comm, bounds: NDArray, slab: NDArray, rows: NDArray) -> NDA
     result = np.empty_like(answers)
     result[order] = answers
     return result
+
+
+def first_of_each_rank(ranks: NDArray) -> tuple[NDArray, NDArray]:
+    """Rows and columns of ranks (e, k) where a rank stands for the first time in its row: where to send each row."""
+    first = np.ones(ranks.shape, bool)
+    for column in range(1, ranks.shape[1]):
+        first[:, column] = (ranks[:, column : column + 1] != ranks[:, :column]).all(axis=1)
+    return np.nonzero(first)  # type: ignore[return-value]
 
 
 class ToSlabs:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.kernel.graph import neighbours
-from ancf_petsc.parallel.exchange import exchange, lookup, scatter_rows
+from ancf_petsc.parallel.exchange import exchange, first_of_each_rank, lookup, scatter_rows
 from ancf_petsc.parallel.partition import partition_nodes
 from ancf_petsc.parallel.slabs import slab_bounds
 
@@ -87,10 +87,7 @@ def _send_cells(comm: MPI.Comm, cells: NDArray, parts: NDArray) -> tuple[NDArray
     """Every cell to each rank that owns one of its nodes. parts: (e, k) rank of each node."""
     count = np.array(len(cells))
     start = int(comm.scan(int(count)) - count)
-    first = np.ones(parts.shape, bool)
-    for a in range(1, parts.shape[1]):
-        first[:, a] = (parts[:, a : a + 1] != parts[:, :a]).all(axis=1)
-    e, a = np.nonzero(first)
+    e, a = first_of_each_rank(parts)
     received = exchange(comm, parts[e, a], cells[e], e + start)
     return received[0], received[1]
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.kernel.graph import neighbours
-from ancf_petsc.parallel.exchange import exchange
+from ancf_petsc.parallel.exchange import exchange, first_of_each_rank
 from ancf_petsc.parallel.slabs import slab_bounds
 
 
@@ -39,10 +39,7 @@ def partition_nodes(comm: MPI.Comm, cells: NDArray, total: int) -> NDArray[np.in
 def _graph_of_slab(comm: MPI.Comm, cells: NDArray, bounds: NDArray) -> tuple[NDArray, NDArray]:
     """Rows of the node graph for this rank's slab, as pointers and global columns without the diagonal."""
     owner = np.searchsorted(bounds, cells, side="right") - 1
-    first = np.ones(owner.shape, bool)
-    for a in range(1, owner.shape[1]):
-        first[:, a] = (owner[:, a : a + 1] != owner[:, :a]).all(axis=1)
-    e, a = np.nonzero(first)
+    e, a = first_of_each_rank(owner)
     (mine,) = exchange(comm, owner[e, a], cells[e])
     low, high = bounds[comm.rank], bounds[comm.rank + 1]
     own = np.arange(low, high)

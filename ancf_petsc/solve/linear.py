@@ -2,10 +2,10 @@
 
 Up to DIRECT_LIMIT degrees of freedom MUMPS factors the symmetric tangent (LDLᵀ: it may be indefinite, and its
 negative pivots are counted). Above, conjugate gradients: with incomplete factors up to MULTIGRID_LIMIT, then with
-algebraic multigrid that knows the rigid motions of the current configuration. Elements with slopes or mid-nodes have long
-rows, on which incomplete factors do little: up to CURVED_LIMIT they are factored, then multigrid takes over. The preconditioner is kept from one
-tangent to the next while it pays. In motion the mass keeps the matrix definite: PETSc's own factorisation, which has
-less to set up, serves small bodies.
+algebraic multigrid that knows the rigid motions of the current configuration. Elements with slopes or mid-nodes
+have long rows, on which incomplete factors do little: up to CURVED_LIMIT they are factored, then multigrid takes
+over. The preconditioner is kept from one tangent to the next while it pays. In motion the mass keeps the matrix
+definite: PETSc's own factorisation, which has less to set up, serves small bodies.
 """
 
 from __future__ import annotations

@@ -105,6 +105,7 @@ class Assembly:
         force[:] = 0.0
         smallest = np.inf
         for region in self.model.regions:
+            assert region.mean_kernels is not None
             found = region.mean_kernels.force(
                 before, after, *self.model.tables, region.parameters, region.first, region.last, force
             )
@@ -181,8 +182,8 @@ class Assembly:
         self._diagonal = self._diagonal_places(own_pointers, own_columns)
         matrix = self._share(own_pointers, own_columns, other_pointers, other_columns)
         if symmetric:
-            matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-            matrix.setOption(PETSc.Mat.Option.SYMMETRY_ETERNAL, True)
+            matrix.setOption(PETSc.Mat.Option.SYMMETRIC, flag=True)
+            matrix.setOption(PETSc.Mat.Option.SYMMETRY_ETERNAL, flag=True)
         return matrix
 
     def tangent(self, x: PETSc.Vec, matrix: PETSc.Mat, add: Callable[[], None] | None = None) -> None:
@@ -215,6 +216,7 @@ class Assembly:
         before, after = self._two_states(x0, x1)
         self._values[:] = 0.0
         for region in self.model.regions:
+            assert region.mean_kernels is not None
             region.mean_kernels.tangent(
                 before,
                 after,

@@ -50,6 +50,7 @@ def prescribed_slopes(
     # Rank 1: the direction held; rank 2: the one left free.
     mark = np.where((rank == 1)[..., None], vectors[..., -1], vectors[..., 0])
     marked = (rank == 1) | ((rank == 2) & (d == 3))
+    assert space.frames is not None
     space.frames[nodes] = _frames(space, nodes, mark, marked)
     along = np.abs(np.einsum("kji,kcj->kci", space.frames[nodes], mark))
     fits = along.max(axis=-1) > 1.0 - ALIGNED
@@ -85,6 +86,7 @@ def _add_projectors(
 
 def _frames(space: Space, nodes: NDArray[np.int64], mark: Floats, marked: NDArray[np.bool_]) -> Floats:
     """(k, 3, 3) directions of the slopes of nodes, the marked ones (k, component, 3) among them where they are perpendicular."""
+    assert space.frames is not None
     default = space.frames[nodes]
     along = np.abs(np.einsum("kji,kcj->kci", default, mark)).max(axis=-1)
     turned = (marked & (along < 1.0 - EXACT)).any(axis=1)

@@ -70,7 +70,7 @@ class Space:
         """(v, 3) nodal vectors of the undeformed body."""
         values = np.empty((self.vectors, 3))
         values[self.positions] = self.points
-        if self.frames is not None:
+        if self.frames is not None and self.lengths is not None:
             with_slopes = np.flatnonzero(np.diff(self.first) > 1)
             for j in range(self.axes.shape[1]):
                 slopes = self.lengths[with_slopes, None] * self.frames[with_slopes, :, j]
@@ -134,6 +134,8 @@ class Space:
         if not s:
             return np.zeros((len(cells), 0, 3, 3))
         nodes = self.cells[cells, :s]
+        assert self.frames is not None
+        assert self.lengths is not None
         directions = self.lengths[nodes, None, None] * np.swapaxes(self.frames[nodes], 2, 3)[:, :, :d]
         return slope_maps(self._geometry(cells).jacobian, self.axes, directions)
 
