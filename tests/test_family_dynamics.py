@@ -1,0 +1,196 @@
+"""Elements with slopes, in the plane and beams in motion and at rest, against independent answers."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from family import SECTION, mesh_of, unit_cube
+
+from ancf_petsc import CaseError, case_from_dict, run
+from ancf_petsc.element.catalog import ELEMENTS
+from ancf_petsc.element.shape import cartesian_values
+
+REFERENCE = Path(__file__).parent / "reference"
+
+
+def motion(mesh, code, duration, **dynamics):
+    return {
+        "title": f"Pendulum of {code}",
+        "mesh": {"file": str(mesh), "element": code},
+        "material": {"law": "svk", "young": 2e6, "poisson": 0.3, "density": 7800.0},
+        "constraint": [{"group": "hinge", "fix": ["x", "y", "z"]}],
+        "load": [{"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}],
+        "dynamics": {"duration": duration, "outputs": round(100 * duration) or 1, **dynamics},
+        "probe": [{"name": "tip", "group": "tip", "mean": "area"}],
+    }
+
+
+def point(results, code, xi):
+    """Positions (steps, 3) of a point of the first cell, from the nodal vectors in the results."""
+    row = ELEMENTS[code]
+    nodes = results.cells[0, : len(row.cell.corners)]
+    jacobian = row.geometry(results.points[nodes][None]).jacobian
+    values = cartesian_values(row.values(np.array([xi])), row.slot, jacobian)[0, 0]
+    track = []
+    for step in range(len(results.times)):
+        now = (results.points + results.field("displacement", step))[nodes]
+        slopes = results.field("slopes", step)[nodes].reshape(len(nodes), 3, 3)
+        track.append(
+            values @ np.concatenate((now[:, None], np.swapaxes(slopes, 1, 2)), axis=1).reshape(-1, 3)
+        )
+    return np.array(track)
+
+
+@pytest.mark.parametrize(("rule", "accuracy"), [("default", 2e-4), ("exact", 1e-6)])
+def test_one_brick_with_slopes_falls_as_another_code_computed_it(rule, accuracy, tmp_path):
+    """Centroid of the end section; 4^3 points are not exact for the energy of a cell this large."""
+    data = motion(
+        mesh_of("pendulum", "3843", (1, 1, 1), tmp_path),
+        "3843",
+        0.5,
+        integrator="runge_kutta_5dp",
+        tolerance=1e-8,
+    )
+    data["mesh"]["rule"] = rule
+    results = run(case_from_dict(data, tmp_path), tmp_path / "run")
+    table = np.genfromtxt(REFERENCE / "pendulum_3843_1x1x1.csv", delimiter=",", names=True)
+    found = point(results, "3843", [0.5, 0.0, 0.0])
+    rows = np.stack([table[axis] for axis in "xyz"], axis=1)[: len(found)]
+    np.testing.assert_allclose(results.times, table["t"][: len(found)], atol=1e-12)
+    np.testing.assert_allclose(found, rows, rtol=0, atol=accuracy)
+
+
+@pytest.mark.parametrize("code", ["3443", "3843", "3-10-1-3"])
+@pytest.mark.parametrize("law", ["svk", "neo_hooke"])
+def test_energy_and_momenta_of_a_free_body_stay(code, law, tmp_path):
+    """Energy-momentum step of elements with slopes and mid-nodes, to Newton's tolerance."""
+    data = motion(
+        mesh_of("pendulum", code, (2, 1, 1), tmp_path), code, 0.2, integrator="energy_momentum", step=0.01
+    )
+    data |= {"constraint": [], "load": [], "initial": {"velocity": [1.0, 0.0, 2.0], "spin": [3.0, 20.0, 5.0]}}
+    data["material"]["law"] = law
+    curve = run(case_from_dict(data, tmp_path), tmp_path / "run").curve
+    assert curve["strain_energy"].max() > 0.01 * curve["kinetic_energy"].max()
+    np.testing.assert_allclose(curve["energy_drift"], 0.0, atol=1e-9 * curve["kinetic_energy"][0])
+    for kind in ("momentum", "angular_momentum"):
+        vector = np.stack([curve[f"{kind}.{axis}"] for axis in "xyz"], axis=1)
+        np.testing.assert_allclose(
+            vector, np.broadcast_to(vector[0], vector.shape), atol=1e-9 * np.linalg.norm(vector[0])
+        )
+
+
+def test_momenta_of_a_spinning_brick(tmp_path):
+    """m v and J omega of a box, slopes carrying their part."""
+    data = motion(mesh_of("pendulum", "3843", (2, 1, 1), tmp_path), "3843", 0.001, step=0.001) | {
+        "constraint": [],
+        "load": [],
+    }
+    data["initial"] = {"velocity": [1.0, 0.0, 0.0], "spin": [0.0, 2.0, 0.0]}
+    curve = run(case_from_dict(data, tmp_path), tmp_path / "run").curve
+    mass = 7800 * 0.005
+    inertia = mass * (0.5**2 + 0.1**2) / 12
+    assert curve["momentum.x"][0] == pytest.approx(mass, rel=1e-12)
+    # About the origin: J omega + m c x v with the centre c at (0.25, 0.05, 0.05).
+    assert curve["angular_momentum.y"][0] == pytest.approx(2 * inertia + mass * 0.05, rel=1e-12)
+    assert curve["kinetic_energy"][0] == pytest.approx(0.5 * mass + 0.5 * inertia * 4, rel=1e-12)
+
+
+def plane_case(mesh, code, section):
+    return {
+        "title": f"Plane body of {code}",
+        "mesh": {"file": str(mesh), "element": code},
+        "section": section,
+        "groups": {"low": {"plane": "x", "at": "min"}, "high": {"plane": "x", "at": "max"}},
+        "material": {
+            "law": "neo_hooke" if section.get("plane") == "strain" else "svk",
+            "young": 1.0,
+            "poisson": 0.3,
+        },
+        "constraint": [
+            {"group": "low", "fix": ["x", "y"]},
+            {"group": "high", "fix": ["y"], "move": {"x": 0.2}},
+        ],
+        "statics": {"steps": 1},
+        "output": {"curve": {"force": "high.x", "stroke": "high.x"}},
+    }
+
+
+def test_plane_strain_is_a_slice_of_the_solid(tmp_path):
+    """One 2432 in plane strain is one 3843 between smooth plates: the same polynomials.
+
+    More cells are not: across them slopes along z may have kinks that nodal slopes in the plane have not.
+    """
+    flat = run(
+        case_from_dict(
+            plane_case(unit_cube("2432", 1, tmp_path), "2432", {"thickness": 0.5, "plane": "strain"}),
+            tmp_path,
+        ),
+        tmp_path / "flat",
+    )
+    import meshio
+
+    read = meshio.read(unit_cube("2432", 1, tmp_path))
+    points = np.vstack((read.points, read.points + [0, 0, 0.5]))
+    quads = read.cells_dict["quad"]
+    meshio.Mesh(points, [("hexahedron", np.hstack((quads, quads + len(read.points))))]).write(
+        tmp_path / "slice.vtu"
+    )
+    data = plane_case(tmp_path / "slice.vtu", "3843", {})
+    del data["section"]
+    data["material"]["law"] = "neo_hooke"
+    for name, at in (("front", "min"), ("back", "max")):
+        data["groups"][name] = {"plane": "z", "at": at}
+        data["constraint"].append({"group": name, "fix": ["z"]})
+    solid = run(case_from_dict(data, tmp_path), tmp_path / "solid")
+    assert flat.curve["force"][-1] == pytest.approx(solid.curve["force"][-1], rel=1e-8)
+    assert flat.curve["strain_energy"][-1] == pytest.approx(solid.curve["strain_energy"][-1], rel=1e-8)
+
+
+def test_beam_sags_as_euler_and_bernoulli_say(tmp_path):
+    """5 w L^4 / (384 E I) at the middle under its own weight, both ends on hinges; cubics have it exactly at nodes."""
+    area, inertia, young, density, gravity = 2e-4, 2e-9, 1e6, 3900.0, 1e-6
+    data = {
+        "title": "Beam",
+        "mesh": {"file": str(mesh_of("ellipsograph", "1222", (4, 1, 1), tmp_path)), "element": "1222"},
+        "section": {"area": area, "inertia": inertia},
+        "groups": {"middle": {"nearest": [0.5, 0.005, 0.01]}},
+        "material": {"law": "svk", "young": young, "poisson": 0.3, "density": density},
+        "constraint": [{"group": "left", "fix": ["x", "z"]}, {"group": "right", "fix": ["z"]}],
+        "load": [{"type": "gravity", "acceleration": [0.0, 0.0, -gravity]}],
+        "statics": {"steps": 1},
+        "probe": [{"name": "middle", "group": "middle"}],
+    }
+    results = run(case_from_dict(data, tmp_path), tmp_path / "run")
+    sag = 5 * density * area * gravity / (384 * young * inertia)
+    # Rotations of 1e-5 and the rounding of positions near 1e-5 m.
+    assert results.probes["middle.uz"][-1] == pytest.approx(-sag, rel=1e-6)
+    assert results.curve["left.rz"][-1] == pytest.approx(density * area * gravity / 2, rel=1e-9)
+    assert results.kind == "line3"
+
+
+@pytest.mark.parametrize(("code", "body"), [("2412", "pendulum"), ("2432", "pendulum"), ("1222", "pendulum")])
+def test_plane_bodies_move_in_their_plane_and_keep_energy(code, body, tmp_path):
+    """A mesh in the plane z-x falls along z; Runge-Kutta's drift is its tolerance."""
+    data = motion(
+        mesh_of(body, code, (4, 1, 1), tmp_path), code, 0.2, integrator="runge_kutta_5dp", tolerance=1e-8
+    )
+    beam = code == "1222"
+    data["section"] = {"area": 0.01, "inertia": 1e-5} if beam else SECTION
+    if beam:
+        data["groups"] = {"hinge": {"plane": "x", "at": "min"}}
+    data["constraint"][0]["fix"] = ["x", "z"]
+    results = run(case_from_dict(data, tmp_path), tmp_path / "run")
+    assert np.ptp(results.probes["tip.y"]) < 1e-15
+    assert results.probes["tip.uz"][-1] < -0.1
+    # The potential energy lost is about 40 J.
+    np.testing.assert_allclose(results.curve["energy_drift"], 0.0, atol=1e-5)
+
+
+def test_beams_have_no_energy_momentum_step(tmp_path):
+    data = motion(
+        mesh_of("pendulum", "1222", (2, 1, 1), tmp_path), "1222", 0.1, integrator="energy_momentum", step=0.01
+    )
+    data["section"] = {"area": 0.01, "inertia": 1e-5}
+    data["constraint"] = []
+    with pytest.raises(CaseError, match="element 1222 with the law svk has no discrete gradient"):
+        run(case_from_dict(data, tmp_path), tmp_path / "run")
