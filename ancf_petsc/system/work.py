@@ -1,8 +1,8 @@
 """Work of driven degrees of freedom and of dead loads along the path.
 
 All of it hangs on a few scalars: each motion has the sum of reactions on its degrees of freedom, each load the
-displacement its pattern sees. W = sum_m ∫ R_m dq_m + sum_l ∫ p_l dD_l, where q_m(s) and p_l(s) are the ramps, known
-exactly, and R_m, D_l follow the polynomial through the last accepted states.
+displacement its pattern sees. W = sum_m ∫ R_m dq_m + sum_l ∫ p_l dD_l, where R_m over q_m and D_l over p_l follow
+polynomials through the last accepted states: over the displacement a force is smoother than over the pseudo-time.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from ancf_petsc.system.constraint import Motion
 from ancf_petsc.system.load import Load
+from ancf_petsc.system.ramp import Ramp
 
 POINTS = 4
-ABSCISSAE, WEIGHTS = np.polynomial.legendre.leggauss(8)
+ABSCISSAE, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 class PathWork:
@@ -50,36 +51,34 @@ class PathWork:
 
     def _increment(self, k: int) -> float:
         """Work between states k - 1 and k."""
-        if len(self._states) == 2:
-            return self._trapezoid()
-        times = np.array([state[0] for state in self._states])
-        middle, half = (times[k] + times[k - 1]) / 2, (times[k] - times[k - 1]) / 2
+        times = [state[0] for state in self._states]
         work = 0.0
-        for t, weight in zip(middle + half * ABSCISSAE, half * WEIGHTS, strict=True):
-            basis = _lagrange(times, t)
-            reactions = sum(b * state[1] for b, state in zip(basis, self._states, strict=True))
-            displacements = sum(b * state[2] for b, state in zip(basis, self._states, strict=True))
-            rates = [motion.amplitude * motion.ramp.rate(t) for motion in self.motions]
-            growth = [load.ramp.rate(t) for load in self.loads]
-            work += weight * (np.dot(reactions, rates) - np.dot(displacements, growth))
+        for m, motion in enumerate(self.motions):
+            reactions = [state[1][m] for state in self._states]
+            work += motion.amplitude * _integral(motion.ramp, times, reactions, k)
         for number, load in enumerate(self.loads):
-            ends = [load.ramp.value(times[j]) * self._states[j][2][number] for j in (k - 1, k)]
-            work += ends[1] - ends[0]
-        return float(work)
-
-    def _trapezoid(self) -> float:
-        """Work between the first two states: force against displacement is a straight line, whatever the ramp."""
-        (s0, reactions_0, seen_0), (s1, reactions_1, seen_1) = self._states
-        moved = [motion.value(s1) - motion.value(s0) for motion in self.motions]
-        factors = [0.5 * (load.ramp.value(s0) + load.ramp.value(s1)) for load in self.loads]
-        return float(np.dot(0.5 * (reactions_0 + reactions_1), moved) + np.dot(factors, seen_1 - seen_0))
+            seen = [state[2][number] for state in self._states]
+            ends = [load.ramp.value(times[j]) * seen[j] for j in (k - 1, k)]
+            work += ends[1] - ends[0] - _integral(load.ramp, times, seen, k)
+        return work
 
 
-def _lagrange(nodes: NDArray, t: float) -> NDArray:
-    """Values at t of the polynomials that are 1 at one node and 0 at the others."""
-    basis = np.ones(len(nodes))
+def _integral(ramp: Ramp, times: Sequence[float], values: Sequence[float], k: int) -> float:
+    """∫ values df from state k - 1 to k, f the factor of the ramp, in which the values follow a polynomial."""
+    factors = np.array([ramp.value(t) for t in times])
+    low, high = factors[k - 1], factors[k]
+    if low == high:
+        return 0.0
+    middle, half = (high + low) / 2, (high - low) / 2
+    points = middle + half * ABSCISSAE
+    return float(half * WEIGHTS @ (_lagrange(factors, points) @ values))
+
+
+def _lagrange(nodes: NDArray, points: NDArray) -> NDArray:
+    """Values (p, n) at points of the polynomials that are 1 at one of n nodes and 0 at the others."""
+    basis = np.ones((len(points), len(nodes)))
     for i in range(len(nodes)):
         for j in range(len(nodes)):
             if i != j:
-                basis[i] *= (t - nodes[j]) / (nodes[i] - nodes[j])
+                basis[:, i] *= (points - nodes[j]) / (nodes[i] - nodes[j])
     return basis
