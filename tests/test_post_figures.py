@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from ancf_petsc.cli import main
 from ancf_petsc.post import figures
+from ancf_petsc.post.reference import read_level, read_reference
 from ancf_petsc.results.reader import open_results
 from ancf_petsc.results.tables import Table
 
@@ -152,3 +153,47 @@ def test_the_script_compares_runs(block, mpirun, project, tmp_path):
     # force 200 times the stroke of 0.1: 20 at most, half of 20 times 0.1 put in and kept
     assert said.count("-20                 1                 1               200               200") == 2
     assert (tmp_path / "both.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_one_component_of_several_runs_with_what_is_known(block, motion, tmp_path):
+    """Runs and a reference in one axis, named in the legend; a level across it with its words and value."""
+    known = tmp_path / "other_code.csv"
+    _write(known, {"time": np.linspace(0, 6, 4), "tip.x": np.linspace(3, 2, 4)})
+    drawn = [motion, read_reference(known, motion)]
+    (axes,) = figures.components(drawn, ["tip.x"], [read_level("Abaqus, a=b=2.5")]).axes
+    assert axes.get_ylabel() == "tip: x position [mm]"
+    np.testing.assert_array_equal(lines(axes)[1][:, 1], np.linspace(3, 2, 4))
+    assert words(axes.figure)[0] == [run.TITLE, "other_code"]
+    assert [text.get_text() for text in axes.texts] == ["Abaqus, a=b: 2.5"]
+    assert axes.lines[-1].get_ydata() == [2.5, 2.5]
+
+
+def test_a_reference_is_drawn_where_its_columns_are(block, tmp_path):
+    known = tmp_path / "measured.csv"
+    _write(known, {"stroke": np.linspace(0, -0.1, 3), "force": np.linspace(0, -25, 3)})
+    made = figures.figures_of([block, read_reference(known, block)])
+    assert [len(made[name].axes[0].lines) for name in ("force_stroke", "energy")] == [3, 2]
+    assert lines(made["force_stroke"].axes[0])[1][-1].tolist() == [0.1, 25.0]
+
+
+def test_plot_draws_components_one_above_the_other(motion, tmp_path, capsys):
+    out = ["--out", str(tmp_path / "plots")]
+    arguments = ["plot", str(motion.folder), "--probe", "tip.x", "--probe", "tip.ux", "--level", "rest=0"]
+    assert main([*arguments, *out]) == 0
+    assert capsys.readouterr().out.strip() == str(tmp_path / "plots" / "tip.x_tip.ux.png")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--probe", "top.w"], "--probe: no such component of a probe: found 'top.w'; did you mean 'top."),
+        (["--level", "a=1"], "--level: of what?; name a component with --probe, as in --probe tip.z"),
+        (["--probe", "top.z", "--level", "0.1"], "--level: found '0.1', expected LABEL=NUMBER"),
+        (["--reference", "FILE"], "no curve to lay over the run: found 'columns t, z', expected time or"),
+    ],
+)
+def test_what_cannot_be_laid_over_is_told(block, arguments, message, tmp_path, capsys):
+    _write(tmp_path / "FILE", {"t": np.arange(3.0), "z": np.arange(3.0)})
+    named = [str(tmp_path / word) if word == "FILE" else word for word in arguments]
+    assert main(["plot", str(block.folder), *named]) == 2
+    assert message in capsys.readouterr().err

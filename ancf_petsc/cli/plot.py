@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ancf_petsc.errors import CaseError, EnvironmentProblem
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ancf_petsc.results.reader import Results
 
 HELP = "draw the curves of a run, or of several together"
 
@@ -13,6 +19,28 @@ HELP = "draw the curves of a run, or of several together"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "runs", metavar="RUN_DIR", type=Path, nargs="+", help="folders that ancf run has written"
+    )
+    parser.add_argument(
+        "--probe",
+        action="append",
+        default=[],
+        metavar="NAME.AXIS",
+        help="draw only this component of a probe (tip.z, end.uz) of all runs; may be given again",
+    )
+    parser.add_argument(
+        "--reference",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE.csv",
+        help="lay its columns over those of the same name; may be given again",
+    )
+    parser.add_argument(
+        "--level",
+        action="append",
+        default=[],
+        metavar="LABEL=VALUE",
+        help="draw a value across the axes of the last --probe; may be given again",
     )
     parser.add_argument(
         "--out",
@@ -34,11 +62,11 @@ def execute(arguments: argparse.Namespace) -> int:
         mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    from ancf_petsc.post.figures import figures_of, save
+    from ancf_petsc.post.figures import save
 
     if arguments.show and mpl.get_backend().lower() == "agg":
         raise EnvironmentProblem("there is no display to open windows on; leave --show out")
-    figures = figures_of(runs)
+    figures = _figures(arguments, runs)
     if not figures:
         raise CaseError("nothing to draw: the tables are empty", file=arguments.runs[0])
     out = arguments.out or (arguments.runs[0] if len(runs) == 1 else Path("plots"))
@@ -52,3 +80,17 @@ def execute(arguments: argparse.Namespace) -> int:
     if arguments.show:
         plt.show()
     return 0
+
+
+def _figures(arguments: argparse.Namespace, runs: list[Results]) -> dict[str, Figure]:
+    """All that the runs have columns for, or the components that were named."""
+    from ancf_petsc.post.figures import components, figures_of
+    from ancf_petsc.post.reference import read_level, read_reference
+
+    if arguments.level and not arguments.probe:
+        raise CaseError("of what?", key="--level", cure="name a component with --probe, as in --probe tip.z")
+    levels = [read_level(text) for text in arguments.level]
+    drawn = [*runs, *(read_reference(path, runs[0]) for path in arguments.reference)]
+    if not arguments.probe:
+        return figures_of(drawn)
+    return {"_".join(arguments.probe): components(drawn, arguments.probe, levels)}

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ancf_petsc.errors import CaseError, did_you_mean
 from ancf_petsc.post.curves import is_compression
 from ancf_petsc.post.panels import (
     Columns,
@@ -17,12 +18,14 @@ from ancf_petsc.post.panels import (
     Table,
     common_units,
     draw,
+    draw_levels,
     finish,
     panels,
     present,
     style,
     time_of,
 )
+from ancf_petsc.post.reference import Level
 from ancf_petsc.post.units import with_unit
 
 FORCES = {"force": "sum of internal forces", "force_stress_area": "stress times area"}
@@ -82,6 +85,7 @@ def force_stroke(runs: Runs) -> Figure | None:
 
 def energy(runs: Runs) -> Figure | None:
     """The energies, and how far their balance drifts."""
+    runs = [run for run in runs if ENERGIES.keys() & run.curve.keys()]
     curves = [run.curve for run in runs]
     quantities = present(ENERGIES, curves)
     if not quantities:
@@ -107,12 +111,12 @@ def energy_drift(curve: Table) -> Columns:
 
 def probes(runs: Runs) -> Figure | None:
     """Probes against time, along the axes they move along: positions in motion, displacements in statics."""
-    runs = [run for run in runs if run.probes]
+    names = list(dict.fromkeys(name[:-3] for run in runs for name in run.probes if name.endswith(".ux")))
+    runs = [run for run in runs if any(f"{name}.{axis}" in run.probes for name in names for axis in "xyz")]
     if not runs:
         return None
     tables = [run.probes for run in runs]
     motion = any("time" in table for table in tables)
-    names = list(dict.fromkeys(name[:-3] for table in tables for name in table if name.endswith(".ux")))
     moving = [axis for axis in "xyz" if _travel(tables, names, axis) > 1e-9 * _travel(tables, names, "xyz")]
     word, letter = ("position", "") if motion else ("displacement", "u")
     with style():
@@ -128,6 +132,29 @@ def _travel(tables: Sequence[Table], names: Sequence[str], axes: str) -> float:
     """The largest displacement of all probes along some axes."""
     columns = [f"{name}.u{axis}" for name in names for axis in axes]
     return max(np.abs(table[name]).max(initial=0.0) for table in tables for name in columns if name in table)
+
+
+def components(runs: Runs, columns: Sequence[str], levels: Sequence[Level] = ()) -> Figure:
+    """Components of probes (tip.z, end.uz) against time, one above the other, a line for each run that has
+    them; levels across the last.
+    """
+    known = sorted({name for run in runs for name in run.probes} - {"time", "pseudo_time"})
+    for column in columns:
+        if column not in known:
+            raise CaseError(
+                "no such component of a probe", key="--probe", got=column, cure=did_you_mean(column, known)
+            )
+    runs = [run for run in runs if set(columns) & run.probes.keys()]
+    with style():
+        figure, places = panels(len(columns))
+        for axes, column in zip(places, columns, strict=True):
+            draw(axes, [run.probes for run in runs], {column: ""})
+            probe, _, axis = column.rpartition(".")
+            words = f"{axis[-1]} {'displacement' if axis.startswith('u') else 'position'}"
+            axes.set_ylabel(f"{probe}: {with_unit(words, common_units(runs).length)}")
+        draw_levels(places[-1], levels)
+        finish(figure, places, runs, {})
+    return figure
 
 
 def momentum(runs: Runs) -> Figure | None:

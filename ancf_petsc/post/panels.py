@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from ancf_petsc.post.reference import Level, Reference
 from ancf_petsc.post.units import Units, read_units, with_unit
 from ancf_petsc.results.reader import Results
 
@@ -54,7 +55,7 @@ STYLE = {
 Columns = NDArray[np.float64]
 Table = Mapping[str, Columns]
 Quantities = Mapping[str, str]  # column of a table -> words in the legend
-Runs = Sequence[Results]
+Runs = Sequence[Results | Reference]
 
 
 def style() -> AbstractContextManager[None]:
@@ -93,6 +94,21 @@ def draw(
                 marker="o" if len(abscissa) <= MARKED_ROWS else "",
                 drawstyle=drawstyle,
             )
+
+
+def draw_levels(axes: Axes, levels: Sequence[Level]) -> None:
+    """Lines across the axes, their words at the left end above them."""
+    for level in levels:
+        axes.axhline(level.value, color=GREY, linestyle=(0, (4, 3)), linewidth=1.0)
+        axes.annotate(
+            f"{level.label}: {level.value:g}",
+            (0.01, level.value),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, 2),
+            textcoords="offset points",
+            fontsize=8,
+            color=GREY,
+        )
 
 
 def time_of(table: Table) -> Columns:
