@@ -21,7 +21,7 @@ from ancf_petsc.system.rigid import rigid_motions
 DIRECT_LIMIT = 3_000
 MULTIGRID_LIMIT = 120_000
 SMALL = 3_000
-CURVED_LIMIT = 30_000
+CURVED_LIMIT = 8_000
 TIRED = 1.5
 
 
