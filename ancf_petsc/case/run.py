@@ -6,6 +6,7 @@ import logging
 import resource
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
@@ -14,7 +15,6 @@ from ancf_petsc.case.build import Built, build_from
 from ancf_petsc.case.clock import Clock
 from ancf_petsc.case.load import Case
 from ancf_petsc.case.load_path import Statics
-from ancf_petsc.case.motion import Motion
 from ancf_petsc.case.record import Record
 from ancf_petsc.case.signals import StopRequest
 from ancf_petsc.case.versions import program_version, versions
@@ -26,6 +26,9 @@ from ancf_petsc.material import law_named
 from ancf_petsc.parallel.exchange import agree, on_root
 from ancf_petsc.results.folder import check_folder, claim_folder, write_summary
 from ancf_petsc.solve.petsc import petsc_options, refuse_unused, refuse_wrong_values
+
+if TYPE_CHECKING:
+    from ancf_petsc.case.motion import Motion
 
 log = logging.getLogger("ancf")
 
@@ -55,7 +58,7 @@ def run_case(
             _compile(case, comm)
             built = build_from(case, blueprint, comm)
             del blueprint
-            solver = Motion(case, built) if case.spec.dynamics else Statics(case, built)
+            solver = _solver(case, built)
         try:
             if case.spec.petsc:
                 with clock.part("setup"), refuse_wrong_values(case.spec.petsc):
@@ -67,6 +70,15 @@ def run_case(
         finally:
             solver.destroy()
     return folder
+
+
+def _solver(case: Case, built: Built) -> Statics | Motion:
+    """What solves the case; what motion needs is imported for motion only."""
+    if case.spec.dynamics is None:
+        return Statics(case, built)
+    from ancf_petsc.case.motion import Motion
+
+    return Motion(case, built)
 
 
 def _read(case: Case) -> Blueprint:

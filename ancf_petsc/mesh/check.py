@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba.extending import register_jitable
 
+from ancf_petsc.kernel.compiled import kernel
 from ancf_petsc.mesh.groups import measure
 from ancf_petsc.mesh.kinds import KINDS, edge_lengths, part_sizes, qualities
 from ancf_petsc.mesh.mesh import Floats, Integers, Mesh
@@ -89,18 +91,35 @@ def connected_pieces(cells: Integers, n_points: int) -> tuple[int, Integers]:
 
     Pieces are numbered by their lowest point; points no cell uses are in piece -1.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
+    return number_pieces(np.ascontiguousarray(cells), n_points)
 
-    first = np.repeat(cells[:, 0], cells.shape[1] - 1)
-    others = cells[:, 1:].ravel()
-    graph = coo_matrix((np.ones(len(first), dtype=bool), (first, others)), shape=(n_points, n_points))
-    _, label = connected_components(graph.tocsr(), directed=False)
-    used = np.zeros(n_points, dtype=bool)
-    used[cells] = True
-    _, first_point, piece = np.unique(label[used], return_index=True, return_inverse=True)
-    rank = np.empty(len(first_point), dtype=np.int64)
-    rank[np.argsort(first_point)] = np.arange(len(first_point))
-    labels = np.full(n_points, -1, dtype=np.int64)
-    labels[used] = rank[piece]
-    return len(first_point), labels
+
+@kernel
+def number_pieces(cells, n_points):
+    """Union and find over cells (e, k): every point points to a lower one of its piece, its lowest to itself."""
+    lower = np.full(n_points, -1, np.int64)
+    for e in range(cells.shape[0]):
+        for a in range(cells.shape[1]):
+            point = cells[e, a]
+            if lower[point] < 0:
+                lower[point] = point
+            top, other = root(lower, cells[e, 0]), root(lower, point)
+            lower[max(top, other)] = min(top, other)
+    count = 0
+    labels = np.full(n_points, -1, np.int64)
+    for point in range(n_points):
+        if lower[point] == point:
+            labels[point] = count
+            count += 1
+        elif lower[point] >= 0:
+            labels[point] = labels[root(lower, point)]
+    return count, labels
+
+
+@register_jitable
+def root(lower, point):
+    """The lowest point of the piece; the way there is halved for the next who asks."""
+    while lower[point] != point:
+        lower[point] = lower[lower[point]]
+        point = lower[point]
+    return point
