@@ -97,17 +97,18 @@ def draw(
 
 
 def draw_levels(axes: Axes, levels: Sequence[Level]) -> None:
-    """Lines across the axes, their words at the left end above them."""
+    """Lines across the axes, their words at the right end above them."""
     for level in levels:
         axes.axhline(level.value, color=GREY, linestyle=(0, (4, 3)), linewidth=1.0)
         axes.annotate(
             f"{level.label}: {level.value:g}",
-            (0.01, level.value),
+            (0.99, level.value),
             xycoords=("axes fraction", "data"),
             xytext=(0, 2),
             textcoords="offset points",
             fontsize=8,
             color=GREY,
+            horizontalalignment="right",
         )
 
 
