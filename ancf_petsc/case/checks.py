@@ -194,6 +194,14 @@ def _section(spec: CaseSpec) -> Problems:
             expected="plane strain for neo_hooke",
             cure="take svk or plane strain",
         )
+    if "area" in needed and any(material.law != "svk" for material in spec.material):
+        yield problem(
+            "beams are linearly elastic",
+            at=["material", 0, "law"],
+            got=next(material.law for material in spec.material if material.law != "svk"),
+            expected="svk for beams",
+            cure='law = "svk": young is all a beam reads of it',
+        )
     for name in needed:
         if name not in given:
             yield problem(
