@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ancf_petsc.case import Case, CaseSpec, case_from_dict
-from ancf_petsc.case.schema import INTEGRATORS, LAWS
+from ancf_petsc.case.schema import LAWS
 from ancf_petsc.errors import CaseError
+from ancf_petsc.solve.methods import METHODS
 
 STATICS = {
     "title": "block",
@@ -90,7 +91,7 @@ def test_runge_kutta_5dp_has_the_tolerance_1e_7_unless_a_step_is_given():
     assert (fixed.step, fixed.tolerance) == (1e-3, None)
 
 
-@pytest.mark.parametrize("name", INTEGRATORS)
+@pytest.mark.parametrize("name", METHODS)
 def test_every_integrator_takes_a_step(name):
     assert case(MOTION, {"dynamics.integrator": name}).spec.dynamics.integrator == name
 
@@ -223,7 +224,7 @@ BAD_MOTION = [
     ({"dynamics.duration": -1.0}, "dynamics.duration", "found -1.0"),
     ({"dynamics.duration": None}, "dynamics.duration", "missing"),
     ({"dynamics.integrator": "bfd"}, "dynamics.integrator", "did you mean 'bdf'"),
-    ({"dynamics.integrator": "newmark"}, "dynamics.integrator", ", ".join(INTEGRATORS)),
+    ({"dynamics.integrator": "newmark"}, "dynamics.integrator", ", ".join(METHODS)),
     ({**RK, "dynamics.tolerance": 1e-7}, "dynamics.tolerance", "step and tolerance given"),
     ({"dynamics.step": None}, "dynamics.step", "a step for generalized_alpha"),
     ({"dynamics.step": None, "dynamics.tolerance": 0.1}, "dynamics.tolerance", "does not adapt it"),

@@ -7,12 +7,13 @@ import numba
 import numpy as np
 import pytest
 
-from ancf_petsc import case_from_dict, cli, run
+from ancf_petsc import case_from_dict, cli, load_case, run
 from ancf_petsc.element import catalog
 from ancf_petsc.element.element import Element
 from ancf_petsc.element.shape import complete_polynomials
 from ancf_petsc.material import models
 from ancf_petsc.mesh.generate import make_mesh
+from ancf_petsc.solve import methods
 
 
 def code_of(project, heading):
@@ -78,6 +79,21 @@ def test_a_material_is_a_block(project):
             block = np.reshape(tangent(tuple(F.ravel()), tuple(unit[J]), tuple(unit[L]), p), (3, 3))
             np.testing.assert_allclose(block[:, k], slope[:, J], rtol=0, atol=1e-8)
     assert np.abs(stress(tuple(np.eye(3).ravel()), p)).max() == 0.0
+
+
+def test_an_integrator_is_a_file_and_a_line(project, monkeypatch, tmp_path):
+    """Twice the steps, a quarter of the error, for a pendulum whose weight comes smoothly."""
+    module = ModuleType(f"{methods.HOME}.midpoint")
+    exec(code_of(project, "Add an integrator"), vars(module))
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setitem(methods.METHODS, "midpoint", methods.Method("midpoint", "midpoint.Midpoint"))
+    pendulum, heights = load_case(project / "cases/pendulum"), []
+    for steps in (50, 100, 200):
+        motion = {"integrator": "midpoint", "duration": 0.5, "step": 0.5 / steps, "outputs": 1}
+        case = pendulum.with_changes({"dynamics": motion, "load.0.ramp": "cosine"})
+        heights.append(run(case, tmp_path / str(steps)).probes["tip.z"][-1])
+    first, second = np.diff(heights)
+    assert first / second == pytest.approx(4.0, rel=0.1)
 
 
 def test_a_verb_is_a_file_and_a_line(project, monkeypatch, capsys):

@@ -1,34 +1,13 @@
-"""The tables that say how a case moves on: [statics], [dynamics], [initial]; the integrators there are."""
+"""The tables that say how a case moves on: [statics], [dynamics], [initial]."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from ancf_petsc.case.types import Table, Vector, key, one_of, problem
-
-
-class Integrator(NamedTuple):
-    """What the case file may ask of an integrator: a tolerance instead of a step, a key of its own."""
-
-    name: str
-    adaptive: bool = False
-    option: str = ""
-
-
-INTEGRATORS = {
-    row.name: row
-    for row in (
-        Integrator("generalized_alpha", option="spectral_radius"),
-        Integrator("energy_momentum"),
-        Integrator("runge_kutta_5dp", adaptive=True),
-        Integrator("runge_kutta_4"),
-        Integrator("rosenbrock", adaptive=True),
-        Integrator("bdf", adaptive=True, option="order"),
-        Integrator("theta", option="theta"),
-    )
-}
+from ancf_petsc.solve.methods import METHODS
 
 
 def _rising(values: tuple[float, ...], name: str) -> None:
@@ -82,7 +61,7 @@ class DynamicsSpec(Table):
     """[dynamics]: motion over `duration`. A step, or a tolerance where the integrator adapts its step."""
 
     duration: float = key("a number > 0; in the unit of time", gt=0)
-    integrator: Annotated[str, one_of(tuple(INTEGRATORS), "an integrator")] = key(
+    integrator: Annotated[str, one_of(METHODS, "an integrator")] = key(
         'an integrator; such as "generalized_alpha"', "generalized_alpha"
     )
     step: float | None = key("a number > 0; in the unit of time", None, gt=0)
@@ -113,8 +92,8 @@ class DynamicsSpec(Table):
                 expected="one of them",
                 cure="drop one",
             )
-        if self.tolerance is not None and not INTEGRATORS[name].adaptive:
-            adaptive = ", ".join(row.name for row in INTEGRATORS.values() if row.adaptive)
+        if self.tolerance is not None and not METHODS[name].adaptive:
+            adaptive = ", ".join(row.name for row in METHODS.values() if row.adaptive)
             raise problem(
                 at=["tolerance"],
                 got=self.tolerance,
@@ -123,7 +102,7 @@ class DynamicsSpec(Table):
             )
         if self.step is None and self.tolerance is None:
             raise problem("missing", at=["step"], expected=f"a step for {name}", cure="such as step = 1e-3")
-        for row in INTEGRATORS.values():
+        for row in METHODS.values():
             if row.option in self.model_fields_set and row.name != name:
                 raise problem(
                     f"{name} does not read it",

@@ -11,11 +11,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from ancf_petsc.case.analysis import (
-    INTEGRATORS,
     CriticalMode,
     DynamicsSpec,
     InitialSpec,
-    Integrator,
     StaticsSpec,
 )
 from ancf_petsc.case.checks import problems
@@ -223,7 +221,6 @@ class CaseSpec(Table):
 
 
 __all__ = [
-    "INTEGRATORS",
     "LAWS",
     "CaseSpec",
     "ConstraintSpec",
@@ -235,7 +232,6 @@ __all__ = [
     "GravitySpec",
     "GroupSpec",
     "InitialSpec",
-    "Integrator",
     "LoadSpec",
     "MaterialSpec",
     "MeshSpec",

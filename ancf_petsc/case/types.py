@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator
@@ -55,12 +55,12 @@ def problem(
     return PydanticCustomError("problem", "{what}", context)
 
 
-def one_of(known: tuple[str, ...], what: str) -> AfterValidator:
-    """A string out of `known`."""
+def one_of(known: Collection[str], what: str) -> AfterValidator:
+    """A string out of `known`, as it is when a case is read."""
 
     def check(word: str) -> str:
         if word not in known:
-            raise problem(got=word, expected=what, cure=did_you_mean(word, known))
+            raise problem(got=word, expected=what, cure=did_you_mean(word, tuple(known)))
         return word
 
     return AfterValidator(check)
