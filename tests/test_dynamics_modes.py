@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from motion_cases import PROJECT, Followed, body, pendulum
 
-from ancf_petsc import load_case
+from ancf_petsc import case_from_dict, load_case
 from ancf_petsc.case.vibration import COLUMNS, find_modes
 from ancf_petsc.errors import CaseError
+from ancf_petsc.mesh.generate import make_mesh
 from ancf_petsc.results.tables import read_table
 
 BAR = PROJECT / "cases" / "bar_tension"
@@ -80,3 +81,40 @@ def test_a_mode_that_does_not_vibrate_is_refused(damping):
     """The pendulum turns freely about its hinge: there is nothing to damp critically."""
     with pytest.raises(CaseError, match=r"dynamics.damping: .*; give a number, or \{ critical = n \}"):
         Followed(pendulum({"duration": 0.1, "step": 0.01, "damping": damping}))
+
+
+def first_bending(folder, element, divisions):
+    """First frequency of a clamped bar, 1 x 0.1 x 0.1 m, over that of an Euler-Bernoulli beam."""
+    folder.mkdir()
+    make_mesh("cantilever", folder / "bar.msh", divisions=divisions, hexahedra=element[:2] == "38")
+    case = case_from_dict(
+        {
+            "title": "Clamped bar",
+            "mesh": {"file": "bar.msh", "element": element},
+            "material": {"law": "svk", "young": 1e7, "poisson": 0.3, "density": 1000.0},
+            "constraint": [{"group": "clamp", "fix": ["x", "y", "z"]}],
+            "dynamics": {"duration": 1.0, "step": 0.1},
+        },
+        folder,
+    )
+    rows = find_modes(case, folder / "modes", 1, loaded=False, force=False)
+    omega = dict(zip(COLUMNS, rows.T, strict=True))["omega"][0]
+    return omega / (1.8751041**2 * np.sqrt(1e7 * 0.1**2 / 12 / 1000.0))
+
+
+def test_bending_frequency_of_a_clamped_bar_is_that_of_beam_theory(tmp_path):
+    """Length over height is 10: shear and rotary inertia lower Euler and Bernoulli's frequency by about 1 %."""
+    quadratic = first_bending(tmp_path / "quadratic", "3-10-1-3", (20, 2, 2))
+    bricks = first_bending(tmp_path / "bricks", "3843", (10, 1, 1))
+    assert quadratic == pytest.approx(0.99, abs=0.01)
+    # Both approach the same solid from above, with different cells.
+    assert quadratic == pytest.approx(bricks, rel=5e-3)
+
+
+def test_linear_tetrahedra_are_too_stiff_in_bending_and_soften_with_refinement(tmp_path):
+    """3413 locks: its frequency comes down towards the quadratic element's, which is a bound from nearer."""
+    coarse = first_bending(tmp_path / "coarse", "3413", (10, 2, 2))
+    fine = first_bending(tmp_path / "fine", "3413", (40, 8, 8))
+    refined = first_bending(tmp_path / "refined", "3-10-1-3", (20, 2, 2))
+    assert coarse > 1.3 * refined
+    assert refined < fine < refined + 0.3 * (coarse - refined)
