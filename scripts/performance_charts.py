@@ -11,7 +11,8 @@ mpl.use("Agg")
 from matplotlib import pyplot as plt
 
 LAWS = {"svk": "Saint Venant-Kirchhoff", "neo_hooke": "neo-Hooke"}
-MARKS = dict(zip(("3413", "3-10-1-3", "3813", "3-20-1-3", "3843"), "osD^v", strict=True))
+BODIES = {"pvc_block": "PVC block at 25 mm", "cube": "cube at 15 mm"}
+MARKS = dict(zip(("3413", "3-10-1-3", "3813", "3843"), "osDv", strict=True))
 Results = dict[str, dict[str, Any]]
 
 
@@ -23,48 +24,51 @@ def sweep(results: Results, name: str) -> dict[tuple[str, ...], dict[str, Any]]:
     return {rest: result for rest, result in found.items() if "problem" not in result}
 
 
-def best_forces(results: Results) -> dict[str, tuple[float, str]]:
-    """For each law the force with most degrees of freedom of elements that do not lock, and which run it is of."""
-    best: dict[str, tuple[float, str]] = {}
-    for law in LAWS:
-        quadratic = {
-            rest: found
-            for rest, found in sweep(results, "accuracy").items()
-            if rest[0] == law and rest[1] in ("3-10-1-3", "3-20-1-3")
-        }
-        if quadratic:
-            rest, found = max(quadratic.items(), key=lambda item: item[1]["facts"]["dof"])
-            best[law] = (found["facts"]["force"], f"{rest[1]} on {rest[2]}")
+def best_forces(results: Results) -> dict[tuple[str, ...], tuple[float, str]]:
+    """For each law and body the force of the finest run of quadratic tetrahedra, and which run it is."""
+    best: dict[tuple[str, ...], tuple[float, str]] = {}
+    finest: dict[tuple[str, ...], int] = {}
+    for rest, found in sweep(results, "accuracy").items():
+        law, body, element, mesh = rest
+        if element == "3-10-1-3" and found["facts"]["dof"] > finest.get((law, body), 0):
+            finest[law, body] = found["facts"]["dof"]
+            best[law, body] = (found["facts"]["force"], mesh)
     return best
 
 
 def draw_accuracy(results: Results, file: Path) -> None:
-    """Error of the force at 25 mm against seconds, a line an element, a panel a law."""
+    """Error of the force at 25 mm against seconds: a line an element, a panel a law and body."""
     best = best_forces(results)
-    figure, panels = plt.subplots(1, 2, figsize=(9.5, 4.2), sharey=True, layout="constrained")
-    for axes, (law, title) in zip(panels, LAWS.items(), strict=True):
+    figure, panels = plt.subplots(2, 2, figsize=(9.5, 7.5), sharey=True, layout="constrained")
+    for axes, (law, body) in zip(panels.flat, [(law, body) for law in LAWS for body in BODIES], strict=True):
+        axes.set(title=f"{BODIES[body]}, {LAWS[law]}", xlabel="seconds, one core")
+        axes.grid(color="#e4e4e4", which="both")
         for element, mark in MARKS.items():
-            points = [
-                (found["median"], abs(found["facts"]["force"] / best[law][0] - 1))
-                for rest, found in sweep(results, "accuracy").items()
-                if law in best and rest[:2] == (law, element)
-            ]
-            points = sorted((seconds, error) for seconds, error in points if error > 0)
+            points = _errors(results, (law, body, element), best)
             if points:
                 axes.loglog(*zip(*points, strict=True), marker=mark, label=element)
-        axes.set(title=title, xlabel="seconds, one core")
-        axes.grid(color="#e4e4e4", which="both")
-    panels[0].set_ylabel("error of the force at 25 mm")
-    panels[0].legend(title="element")
+                axes.legend(title="element")
+    panels[0, 0].set_ylabel("error of the force")
+    panels[1, 0].set_ylabel("error of the force")
     figure.savefig(file, dpi=160)
     plt.close(figure)
 
 
+def _errors(results: Results, line: tuple[str, str, str], best: dict) -> list[tuple[float, float]]:
+    """Seconds and error of the runs of one law, body and element, without the one errors are against."""
+    if line[:2] not in best:
+        return []
+    force, _ = best[line[:2]]
+    found = [run for rest, run in sweep(results, "accuracy").items() if rest[:3] == line]
+    points = sorted((run["median"], abs(run["facts"]["force"] / force - 1)) for run in found)
+    return [(seconds, error) for seconds, error in points if error > 0]
+
+
 def draw_strokes(results: Results, file: Path) -> None:
-    """The stroke that is reached against the size of edges, a line a law and body; an arrow where the case's end was."""
+    """The stroke that is reached against the size of edges; a triangle where it is the end asked for."""
     figure, axes = plt.subplots(figsize=(6.5, 4.2), layout="constrained")
     for law, title in LAWS.items():
-        for body, mark in (("cube", "o"), ("pvc_block", "s")):
+        for body, mark in zip(BODIES, "so", strict=True):
             rows = [
                 (1e3 * float(rest[1].split(":")[1]), 1e3 * found["median"], found["facts"]["ended"])
                 for rest, found in sweep(results, "stroke").items()

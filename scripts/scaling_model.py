@@ -3,9 +3,8 @@
     T(n, p) = serial n + work n (1 + overlap) / p
               + iterations (exchanges (neighbours latency + bytes / bandwidth) + sums sum log2 p)
 
-serial: what the root rank does alone, an element. work: what ranks share, an element, taken from two ranks at once,
-for the ranks of a node share its memory as those two do. Ghosts grow with the surface of a rank's part,
-(nodes / p)^(2/3).
+serial: per element, by the root rank alone. work: per element, shared by the ranks, as found on two at once, for
+the ranks of a node share its memory. Ghosts grow with the surface of a part, (nodes / p)^(2/3).
 """
 
 from __future__ import annotations

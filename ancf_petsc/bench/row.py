@@ -12,7 +12,7 @@ BLOCK_74K = {"name": "block", "mesh": CUBE_74K, "stroke": 0.010, "steps": 10}
 BLOCK_480K = {"name": "block", "mesh": CUBE_480K, "stroke": 0.005, "steps": 10}
 FORCE_9K = {"force": -2110.66766346, "elements": 9670}
 FORCE_74K = {"force": -1544.8400796, "elements": 73606}
-FORCE_480K: dict[str, float] = {}
+FORCE_480K = {"force": -847.8394655, "elements": 478059}
 ALL, SOLUTION = ("read", "setup", "solve", "output"), ("solve",)
 
 

@@ -23,9 +23,9 @@ Result = dict[str, Any]
 
 
 def run_suite(
-    rows: Sequence[Row], *, repetitions: int | None = None, tell: Callable[[Row, Result], None]
+    rows: Sequence[Row], *, repetitions: int | None = None, tell: Callable[[Row, dict[str, Any]], None]
 ) -> dict[str, Any]:
-    """Measure the yardstick and all rows. tell: called with each row's result as it comes."""
+    """Measure the yardstick and all rows. tell: called with a row and the report so far when it is done."""
     from ancf_petsc.case.versions import versions
 
     report: dict[str, Any] = {"date": now(), "commit": commit(), "machine": machine(), "versions": versions()}
@@ -35,7 +35,7 @@ def run_suite(
     for row in rows:
         found = _derived(row, results, report["yardstick"]) if row.of else _measured(row, repetitions)
         results[row.name] = judged(row, found)
-        tell(row, results[row.name])
+        tell(row, report)
     return report
 
 
@@ -84,9 +84,9 @@ def _started(words: Sequence[str], until: str, repetitions: int) -> Result:
     """Seconds from the command until it prints `until`; one start before warms the caches."""
     samples = []
     with tempfile.TemporaryDirectory() as place:
-        out = ["--out", place] if words[0] == "run" else []
-        command = [sys.executable, "-m", "ancf_petsc", *words, *out]
-        for _ in range(repetitions + 1):
+        for number in range(repetitions + 1):
+            out = ["--out", f"{place}/{number}"] if words[0] == "run" else []
+            command = [sys.executable, "-m", "ancf_petsc", *words, *out]
             begun = time.perf_counter()
             with subprocess.Popen(
                 command, stdout=subprocess.PIPE, text=True, cwd=PROJECT, env=environment()

@@ -140,7 +140,7 @@ DYNAMICS = [
         "pendulum_1e-7",
         "the same within 1e-7 m, Runge-Kutta 5dp",
         "run",
-        _pendulum(integrator="runge_kutta_5dp", tolerance=1e-7),
+        _pendulum(integrator="runge_kutta_5dp", tolerance=3e-8),
         target=0.15,
         allowed=1e-7,
         small=True,

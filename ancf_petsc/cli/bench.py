@@ -8,9 +8,9 @@ from typing import Any
 
 HELP = "time a fixed set of configurations with known answers, beside a yardstick of the machine"
 EPILOG = """\
-names may be beginnings (accuracy, stroke, scaling) or patterns ("pendulum*"); without any, all of the table run.
-Larger meshes are made once and kept in ~/.cache/ancf_petsc/meshes. Every configuration runs in processes of its
-own, on several ranks under mpiexec; let the machine do nothing else meanwhile."""
+names may be beginnings (accuracy, stroke, scaling) or patterns ("pendulum*"); without any, the table runs.
+Larger meshes are made once and kept in ~/.cache/ancf_petsc/meshes. Every configuration runs in processes of
+its own, on several ranks under mpiexec; let the machine do nothing else meanwhile."""
 COLUMNS = ("benchmark", "median", "at most", "unit", "spread %", "error", "verdict", "what")
 
 
@@ -32,8 +32,6 @@ def execute(arguments: argparse.Namespace) -> int:
         show_table(("benchmark", "quick", "ranks", "what"), listed)
         return 0
     report = _measured(choose(arguments.names, quick=arguments.quick), arguments)
-    if arguments.json:
-        _write(report, arguments.json)
     _show(report)
     wrong = [name for name, result in report["results"].items() if result.get("right") is False]
     return 1 if wrong else 0
@@ -56,9 +54,12 @@ def _refuse_wrong(arguments: argparse.Namespace) -> None:
 def _measured(rows: Any, arguments: argparse.Namespace) -> dict[str, Any]:
     from ancf_petsc.bench.suite import run_suite
 
-    def tell(row: Any, result: dict[str, Any]) -> None:
+    def tell(row: Any, report: dict[str, Any]) -> None:
+        result = report["results"][row.name]
         found = result.get("problem") or f"{result['median']:.4g} {result['unit']}"
         print(f"{row.name}: {found}", flush=True)
+        if arguments.json:
+            _write(report, arguments.json)
 
     return run_suite(rows, repetitions=arguments.repetitions, tell=tell)
 
