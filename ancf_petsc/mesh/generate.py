@@ -117,9 +117,7 @@ def bricks(grid: Floats) -> tuple[Floats, Integers]:
     return grid.reshape(-1, 3), np.stack([corner.ravel() for corner in lower + upper], axis=1)
 
 
-def _flat(
-    body: Body, divisions: Sequence[int], kind: str
-) -> tuple[Floats, list[tuple[str, int, Integers]]]:
+def _flat(body: Body, divisions: Sequence[int], kind: str) -> tuple[Floats, list[tuple[str, int, Integers]]]:
     """Points and groups of the section half way along y (quadrilaterals in z-x) or of the axis along x (lines)."""
     d = KINDS[kind].dimension
     nx, _, nz = divisions
