@@ -78,7 +78,7 @@ def draw_strokes(results: Results, file: Path) -> None:
                 continue
             rows.sort()
             sizes, strokes, ended = zip(*rows, strict=True)
-            (line,) = axes.semilogx(sizes, strokes, marker=mark, label=f"{body}, {title}")
+            (line,) = axes.plot(sizes, strokes, marker=mark, label=f"{body}, {title}")
             on = [(size, reached) for size, reached, end in rows if not end]
             if on:
                 axes.plot(

@@ -196,6 +196,8 @@ def charts(results: Report) -> list[str]:
             f"Errors are against the finest run of quadratic tetrahedra, forces of the quarter: {', '.join(best)}.",
             "",
         ]
+        failed = [f"- `{name}`: {found['problem']}" for name, found in results.items() if cannot(name, found)]
+        lines += ["These end before:", "", *failed, ""] if failed else []
     if sweep(results, "stroke"):
         draw_strokes(results, STORE / "stroke.png")
         lines += [
@@ -211,6 +213,10 @@ def charts(results: Report) -> list[str]:
         ]
         lines += table(("law", "mesh", "stroke, mm", "why it ends"), rows)
     return lines
+
+
+def cannot(name: str, found: Report) -> bool:
+    return name.startswith("accuracy/") and "problem" in found
 
 
 def scaling(results: Report) -> list[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ancf_petsc.bench.row import CUBE_74K, Row, press
 
 STROKES = {"pvc_block": 0.025, "cube": 0.015}
@@ -29,18 +31,7 @@ def _accuracy() -> list[Row]:
             f"accuracy/{law}/{body}/{element}/{mesh}",
             f"force of the {body} at {1e3 * STROKES[body]:.0f} mm",
             "run",
-            press(
-                {
-                    "name": "block",
-                    "mesh": mesh,
-                    "stroke": STROKES[body],
-                    "steps": 5,
-                    "law": law,
-                    "element": element,
-                    "smallest_step": 1e-3,
-                },
-                {},
-            ),
+            _accurate(mesh, STROKES[body], law, element),
             repetitions=2,
         )
         for law in ("svk", "neo_hooke")
@@ -48,6 +39,13 @@ def _accuracy() -> list[Row]:
         for element, names in elements.items()
         for mesh in names
     ]
+
+
+def _accurate(mesh: str, stroke: float, law: str, element: str) -> dict[str, Any]:
+    """The task of one run, warmed up by its own element and law."""
+    problem = {"name": "block", "mesh": mesh, "law": law, "element": element, "smallest_step": 1e-3}
+    problem |= {"stroke": stroke, "steps": 5}
+    return {"problem": problem, "warm_up": problem | {"stroke": 1e-5, "steps": 1}}
 
 
 def _strokes() -> list[Row]:
