@@ -26,9 +26,8 @@ def run_suite(
     rows: Sequence[Row], *, repetitions: int | None = None, tell: Callable[[Row, dict[str, Any]], None]
 ) -> dict[str, Any]:
     """Measure the yardstick and all rows. tell: called with a row and the report so far when it is done."""
-    from ancf_petsc.case.versions import versions
-
-    report: dict[str, Any] = {"date": now(), "commit": commit(), "machine": machine(), "versions": versions()}
+    report: dict[str, Any] = {"date": now(), "commit": commit(), "machine": machine()}
+    report["versions"] = launch("versions", {})["facts"]
     report["yardstick"] = yardstick(rows)
     results: dict[str, Result] = {}
     report["results"] = results
