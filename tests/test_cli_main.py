@@ -1,6 +1,7 @@
 """The command `ancf`: verbs, one-line errors, exit codes, alone and under mpiexec."""
 
 import os
+import shlex
 import subprocess
 import sys
 import time
@@ -150,7 +151,7 @@ def test_a_verb_without_petsc_refuses_its_options(verb, capsys):
 
 
 def test_a_closed_pipe_ends_quietly():
-    command = f"{sys.executable} -m ancf_petsc --help | true"
+    command = f"{shlex.quote(sys.executable)} -m ancf_petsc --help | true"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True)
     assert done.stderr == ""
 
