@@ -86,7 +86,10 @@ def _print_case(case: Case, blueprint: Blueprint) -> None:
         ("case", spec.title),
         ("analysis", _analysis(case)),
         ("degrees of freedom", f"{dof}, {driven} of them held or moved"),
-        ("memory", f"about {memory_estimate(len(blueprint.space.cells), dof) / 1e9:.2g} GB over all ranks"),
+        (
+            "memory",
+            f"about {memory_estimate(len(blueprint.space.cells), dof) / 1e9:.2g} GB, and 0.25 GB for each further rank",
+        ),
     ]
     counts = np.bincount(blueprint.material, minlength=len(spec.material))
     for material, count in zip(spec.material, counts, strict=True):
