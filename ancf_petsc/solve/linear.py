@@ -126,13 +126,6 @@ class LinearSolver:
         for item in (rigid, *vectors):
             item.destroy()
 
-    def negative_pivots(self) -> int | None:
-        """How many negative pivots the last factorisation met; None if there was none by MUMPS."""
-        pc = self.ksp.getPC()
-        if pc.getType() != "cholesky" or pc.getFactorSolverType() != "mumps":
-            return None
-        return int(pc.getFactorMatrix().getMumpsInfog(12))
-
     def gave_up(self) -> bool:
         """Whether an iterative method failed where a factorisation would go on."""
         return not self.direct and self.ksp.getConvergedReason() < 0

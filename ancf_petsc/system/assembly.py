@@ -25,7 +25,6 @@ class Assembly:
     def __init__(self, model: Model) -> None:
         self.model = model
         self.comm = model.comm
-        self.tangent_evaluations = 0
         self.largest_diagonal = 0.0
         n = model.owned
         self._positions = model.reference.copy()
@@ -188,7 +187,6 @@ class Assembly:
 
     def tangent(self, x: PETSc.Vec, matrix: PETSc.Mat, add: Callable[[], None] | None = None) -> None:
         """Fill the matrix with the tangent at x, and what `add` adds to it (`add_mass`)."""
-        self.tangent_evaluations += 1
         positions, values = self.local(x), self._values
         values[:] = 0.0
         for region in self.model.regions:
@@ -212,7 +210,6 @@ class Assembly:
         self, x0: PETSc.Vec, x1: PETSc.Vec, matrix: PETSc.Mat, add: Callable[[], None] | None = None
     ) -> None:
         """Fill the matrix with the derivative of `mean_force` with respect to x1, and what `add` adds to it."""
-        self.tangent_evaluations += 1
         before, after = self._two_states(x0, x1)
         self._values[:] = 0.0
         for region in self.model.regions:
