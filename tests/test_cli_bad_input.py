@@ -153,3 +153,10 @@ def test_wrong_petsc_options_are_told(options, words, project, tmp_path, capsys)
     assert code == 2
     assert words in said
     assert not (tmp_path / "run").exists()
+
+
+def test_options_without_a_value_are_taken(project, tmp_path, capfd):
+    out = tmp_path / "run"
+    words = ["run", str(project / "cases/pvc_block"), "--out", str(out), "--set", "statics.steps=1"]
+    assert main([*words, "--", "-ksp_type", "cg", "-pc_type", "gamg", "-ksp_monitor"]) == 0
+    assert "KSP Residual norm" in capfd.readouterr().out

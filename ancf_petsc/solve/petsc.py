@@ -83,8 +83,9 @@ def refuse_unused(given: Mapping[str, object]) -> None:
 
 
 def _text(value: object) -> str:
+    """As PETSc reads it; a bare option, such as -ksp_monitor, has no value."""
     if isinstance(value, bool):
-        return "true" if value else "false"
+        return "" if value else "false"
     return "" if value is None else str(value)
 
 
