@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from family import SECTION, mesh_of, unit_cube
 
-from ancf_petsc import CaseError, case_from_dict, run
+from ancf_petsc import case_from_dict, run
 from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.element.shape import cartesian_values
 
@@ -205,13 +205,3 @@ def test_plane_bodies_move_in_their_plane_and_keep_energy(code, body, tmp_path):
     assert results.probes["tip.uz"][-1] < -0.1
     # The potential energy lost is about 40 J.
     np.testing.assert_allclose(results.curve["energy_drift"], 0.0, atol=1e-5)
-
-
-def test_beams_have_no_energy_momentum_step(tmp_path):
-    data = motion(
-        mesh_of("pendulum", "1222", (2, 1, 1), tmp_path), "1222", 0.1, integrator="energy_momentum", step=0.01
-    )
-    data["section"] = {"area": 0.01, "inertia": 1e-5}
-    data["constraint"] = []
-    with pytest.raises(CaseError, match="element 1222 with the law svk has no discrete gradient"):
-        run(case_from_dict(data, tmp_path), tmp_path / "run")

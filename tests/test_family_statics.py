@@ -65,6 +65,14 @@ def test_clamped_faces_hold_tangent_slopes(code, divisions, rule, answer, tmp_pa
     assert found == pytest.approx(answer, abs=1.5e-6)
 
 
+def test_all_slopes_of_a_clamp_can_be_held(tmp_path):
+    """What the same code finds with r and all slopes held on 8 bricks; the clamp is too stiff then."""
+    data = cantilever(mesh_of("cantilever", "3843", (8, 1, 1), tmp_path), "3843")
+    data["constraint"][0]["slopes"] = ["x", "y", "z"]
+    results = run(case_from_dict(data, tmp_path), tmp_path / "run")
+    assert results.probes["end.uz"][-1] == pytest.approx(-0.333837, abs=1.5e-6)
+
+
 def turned(mesh, path, turn):
     """A mesh of bricks or tetrahedra in another frame, without groups."""
     read = meshio.read(mesh)

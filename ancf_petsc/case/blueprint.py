@@ -31,7 +31,7 @@ from ancf_petsc.system.constraint import ConstraintTable, Motion, Support, tabul
 from ancf_petsc.system.free_motion import free_motions
 from ancf_petsc.system.measures import AXES, CurveChoice
 from ancf_petsc.system.ramp import make_ramp
-from ancf_petsc.system.slopes import prescribed_slopes
+from ancf_petsc.system.slopes import prescribed_slopes, slopes_at
 from ancf_petsc.system.space import Space
 
 STROKE = "stroke"
@@ -124,7 +124,7 @@ class _Drawer:
         spoken = [load.total if isinstance(load, ForceSpec) else load.acceleration for load in self.spec.load]
         spoken += [self.spec.initial.velocity] if self.spec.initial else []
         used = {i for vector in spoken for i in range(3) if vector[i]}
-        used |= {AXES.index(axis) for spec in self.spec.constraint for axis in spec.move}
+        used |= {AXES.index(axis) for spec in self.spec.constraint for axis in (*spec.move, *spec.slopes)}
         return next((i for i in reversed(flat) if i not in used), flat[-1])
 
     def positions(self, group: Group) -> NDArray[np.int64]:
@@ -135,7 +135,7 @@ class _Drawer:
         return find_group(self.mesh, name, key, self.file)
 
     def constraints(self) -> ConstraintTable:
-        supports, tangents = [], []
+        supports, tangents, held = [], [], []
         for spec in self.spec.constraint:
             group = self.group(spec.group, f"constraint.{spec.group}.group")
             ramp = make_ramp(spec.ramp, "linear")
@@ -144,6 +144,7 @@ class _Drawer:
             supports.append(Support(spec.group, self.positions(group), motions))
             if self.element.has_slopes:
                 tangents.append((set(motions), parts_for_support(self.mesh, group)))
+            held += [(slopes_at(self.space, group.nodes), AXES.index(axis)) for axis in spec.slopes]
         numbers = self.mesh.node_numbers[self.space.nodes][self.space.node_of()]
         try:
             table = tabulate(supports, self.space.vectors, numbers)
@@ -152,6 +153,8 @@ class _Drawer:
             raise
         if self.element.has_slopes:
             self._hold_slopes(table, tangents)
+        for vectors, axis in held:
+            table.hold(vectors, axis)
         if self.normal is not None:
             table.hold(np.arange(self.space.vectors), self.normal)
         return table
@@ -170,8 +173,10 @@ class _Drawer:
         """Raise CaseError if a connected piece of the body can move without deforming."""
         space = self.space
         pieces, label = connected_pieces(space.cells, len(space.nodes))
-        points, driven = space.points, constraints.motion[space.positions] >= 0
-        free = free_motions(points, driven, label, pieces, normal=self.normal)
+        points, driven, nodes = space.points, constraints.motion >= 0, space.node_of()
+        free = free_motions(
+            space.reference(), driven, label[nodes], pieces, slopes=space.slots() > 0, normal=self.normal
+        )
         if not free:
             return
         piece, names = next(iter(free.items()))

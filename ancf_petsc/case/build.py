@@ -154,7 +154,7 @@ def _enter_cells(case: Case, plan: Blueprint | None, model: Model) -> None:
             Region(
                 law=law,
                 kernels=way.kernels(law),
-                mean_kernels=way.mean_kernels(law) if way.mean_kernels and law.mean_stress else None,
+                mean_kernels=way.mean_kernels(law) if law.mean_stress else None,
                 parameters=_parameters(model.element, law, given, spec),
                 density=given.density,
                 first=int(first),

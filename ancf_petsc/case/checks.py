@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from pydantic_core import PydanticCustomError
 
 from ancf_petsc.case.types import Direction, Ramp, problem
+from ancf_petsc.element import dncm
+from ancf_petsc.errors import CaseError
 
 if TYPE_CHECKING:
     from ancf_petsc.case.schema import CaseSpec, ConstraintSpec
@@ -17,7 +19,10 @@ Problems = Iterator[PydanticCustomError]
 
 def problems(spec: CaseSpec) -> list[PydanticCustomError]:
     """All that is wrong between the tables, the most basic first."""
-    checks = (_one_analysis, _materials, _densities, _unions, _probes, _motion, _strokes, _section, _options)
+    checks = (
+        *(_one_analysis, _materials, _densities, _unions, _probes, _motion, _strokes, _section, _held_slopes),
+        _options,
+    )
     return [found for check in checks for found in check(spec)]
 
 
@@ -209,6 +214,25 @@ def _section(spec: CaseSpec) -> Problems:
                 at=["section", name],
                 expected=f"{' and '.join(needed)} for element {code}",
                 cure="add it to [section]",
+            )
+
+
+def _held_slopes(spec: CaseSpec) -> Problems:
+    """Only elements with slopes can hold some. What is no code at all is told when the element is looked up."""
+    code = spec.mesh.element
+    try:
+        if dncm.parse(code).vectors > 1:
+            return
+    except CaseError:
+        return
+    for index, constraint in enumerate(spec.constraint):
+        if constraint.slopes:
+            yield problem(
+                f"element {code} has no slopes",
+                at=["constraint", index, "slopes"],
+                got=constraint.slopes,
+                expected="an element with slopes",
+                cure="drop it: fix holds all that a node of this element has",
             )
 
 

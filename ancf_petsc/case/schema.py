@@ -93,18 +93,21 @@ class MaterialSpec(Table):
 
 
 class ConstraintSpec(Table):
-    """One [[constraint]]: components held (fix) and driven (move) of a group."""
+    """One [[constraint]]: components held (fix) and driven (move) of a group, and of its nodes' slopes held (slopes)."""
 
     group: Name = key("a group's name in quotes; of the mesh file or of [groups]")
     fix: Axes = key('a list out of "x", "y", "z"; such as ["x", "y"]', ())
     move: dict[Axis, float] = key("displacements by axis; such as { z = -0.025 }", {})
+    slopes: Axes = key('a list out of "x", "y", "z"; components of the slopes to hold, such as ["z"]', ())
     ramp: RampKey = key('a ramp; such as "cosine"', "linear")
 
     @model_validator(mode="after")
     def _check(self) -> ConstraintSpec:
-        if not self.fix and not self.move:
+        if not self.fix and not self.move and not self.slopes:
             raise problem(
-                "neither fix nor move", expected="one of them at least", cure='such as fix = ["x", "y", "z"]'
+                "neither fix nor move nor slopes",
+                expected="one of them at least",
+                cure='such as fix = ["x", "y", "z"]',
             )
         both = [axis for axis in AXES if axis in self.fix and axis in self.move]
         if both:

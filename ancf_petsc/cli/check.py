@@ -103,6 +103,7 @@ def _print_case(case: Case, blueprint: Blueprint) -> None:
         words = (["holds " + ", ".join(held)] if held else []) + (
             ["moves " + ", ".join(moved)] if moved else []
         )
+        words += ["holds slopes in " + ", ".join(constraint.slopes)] if constraint.slopes else []
         nodes = int(blueprint.members[constraint.group].sum())
         facts.append(("constraint", f"{constraint.group}, {nodes} nodes: {'; '.join(words)}"))
     for load in spec.load:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ancf_petsc.element.element import Element
-from ancf_petsc.kernel import beam, generic, mean, mean_generic, tet3413
+from ancf_petsc.kernel import beam, generic, mean, mean_beam, mean_generic, tet3413
 from ancf_petsc.kernel.mean import MeanKernels
 from ancf_petsc.kernel.tables import make_tables, nodes_with_slopes
 from ancf_petsc.kernel.tet3413 import Kernels
@@ -23,7 +23,7 @@ class Way(NamedTuple):
 
     tables: Callable[..., tuple]
     kernels: Callable[[Law], Kernels]
-    mean_kernels: Callable[[Law], MeanKernels] | None
+    mean_kernels: Callable[[Law], MeanKernels]
 
 
 def _generic_tables(element: Element, cells: NDArray[np.int32], reference: Floats, **more) -> tuple:
@@ -40,7 +40,7 @@ def _tables_3413(element: Element, cells: NDArray[np.int32], reference: Floats, 
 
 
 ANY = Way(_generic_tables, generic.make_kernels, mean_generic.make_mean_kernels)
-BEAM = Way(_generic_tables, beam.make_kernels, None)
+BEAM = Way(_generic_tables, beam.make_kernels, mean_beam.make_mean_kernels)
 FAST = {"3413": Way(_tables_3413, tet3413.make_kernels, mean.make_mean_kernels)}
 
 

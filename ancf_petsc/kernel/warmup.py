@@ -43,7 +43,7 @@ def compile_kernels(element: Element, laws: Sequence[Law], *, mean: bool = False
         kernels.tangent(positions, *tables, p, 0, 1, *matrix)
         kernels.tangent_product(positions, positions, *tables, p, 0, 1, force)
         kernels.fields(positions, *tables, p, 0, 1, np.empty((1, 9)), np.empty((1, 9)), np.empty(1))
-        if mean and law.mean_stress is not None and way.mean_kernels is not None:
+        if mean and law.mean_stress is not None:
             between = way.mean_kernels(law)
             between.force(positions, positions, *tables, p, 0, 1, force)
             between.tangent(positions, positions, *tables, p, 0, 1, *matrix)

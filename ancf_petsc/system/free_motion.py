@@ -9,20 +9,27 @@ AXES = ("x", "y", "z")
 
 
 def free_motions(
-    points: NDArray, driven: NDArray, piece: NDArray, pieces: int, normal: int | None = None
+    vectors: NDArray,
+    driven: NDArray,
+    piece: NDArray,
+    pieces: int,
+    *,
+    slopes: NDArray | None = None,
+    normal: int | None = None,
 ) -> dict[int, list[str]]:
     """Names of the free rigid motions of each piece that has some.
 
-    points (n, 3), driven (n, 3) bool, piece (n,) label of each node, -1 for nodes of no cell.
-    A motion is free if it moves no driven degree of freedom: the null space of the 6 x 6 Gram matrix of the motions at the
-    driven degrees of freedom. Rotations are scaled by the size of the piece. normal: of a plane body, which has no other motions
-    than those in its plane.
+    vectors (v, 3) undeformed positions and slopes, driven (v, 3) bool, piece (v,) label of each, -1 for those of no cell, slopes
+    (v,) bool which are slopes, default none. A motion is free if it moves no driven degree of freedom: the null space of the
+    6 x 6 Gram matrix of the motions at the driven degrees of freedom. Rotations are scaled by the size of the piece, slopes to
+    length 1. normal: of a plane body, which has no other motions than those in its plane.
     """
+    slopes = np.zeros(len(vectors), bool) if slopes is None else slopes
     found = {}
     others = np.zeros(6)
     if normal is not None:
         others[[normal, 3 + (normal + 1) % 3, 3 + (normal + 2) % 3]] = 1.0
-    for label, gram, centre, size in _gram_matrices(points, driven, piece, pieces):
+    for label, gram, centre, size in _gram_matrices(vectors, driven, piece, pieces, slopes):
         values, vectors = np.linalg.eigh(gram + np.diag(others))
         null = vectors[:, values <= 1e-12 * max(np.trace(gram), others.sum(), 1e-300)]
         if null.shape[1]:
@@ -30,21 +37,23 @@ def free_motions(
     return found
 
 
-def _gram_matrices(points, driven, piece, pieces):
+def _gram_matrices(vectors, driven, piece, pieces, slopes):
     """Label, Gram matrix, centre and size of each piece."""
     used = piece >= 0
-    count = np.bincount(piece[used], minlength=pieces)
-    centre = (
-        np.stack([np.bincount(piece[used], points[used, i], pieces) for i in range(3)], 1) / count[:, None]
-    )
-    arm = np.zeros_like(points)
-    arm[used] = points[used] - centre[piece[used]]
-    size = np.sqrt(np.bincount(piece[used], (arm[used] ** 2).sum(axis=1), pieces) / count)
+    at = used & ~slopes
+    count = np.bincount(piece[at], minlength=pieces)
+    centre = np.stack([np.bincount(piece[at], vectors[at, i], pieces) for i in range(3)], 1) / count[:, None]
+    arm = np.zeros_like(vectors)
+    arm[at] = vectors[at] - centre[piece[at]]
+    size = np.sqrt(np.bincount(piece[at], (arm[at] ** 2).sum(axis=1), pieces) / count)
+    turning = used & slopes
+    lengths = np.linalg.norm(vectors[turning], axis=1)
+    arm[turning] = vectors[turning] * (size[piece[turning]] / lengths)[:, None]
     grams = np.zeros((pieces, 6, 6))
     for i in range(3):
         rows = np.flatnonzero(driven[:, i] & used)
         modes = np.zeros((len(rows), 6))
-        modes[:, i] = 1.0
+        modes[:, i] = ~slopes[rows]
         scaled = arm[rows] / size[piece[rows], None]
         j, k = (i + 1) % 3, (i + 2) % 3
         modes[:, 3 + j], modes[:, 3 + k] = scaled[:, k], -scaled[:, j]

@@ -63,6 +63,12 @@ def prescribed_slopes(
     return held, int((marked & ~fits).any(axis=1).sum())
 
 
+def slopes_at(space: Space, points: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The nodal vectors that are slopes of nodes, which are given as indices into the mesh's points."""
+    nodes = space.compact[points]
+    return np.flatnonzero(np.isin(space.node_of(), nodes) & (space.slots() > 0))
+
+
 def _add_projectors(
     space: Space, tangents: Floats, components: list[int], dimension: int, corners: NDArray[np.int64]
 ) -> None:

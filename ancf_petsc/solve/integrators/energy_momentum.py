@@ -30,11 +30,10 @@ class EnergyMomentum(OneStep):
         for region in equations.assembly.model.regions:
             if region.mean_kernels is None:
                 raise CaseError(
-                    f"element {equations.assembly.model.element.code} with the law {region.law.name} "
-                    "has no discrete gradient",
+                    f"the law {region.law.name} has no discrete gradient",
                     key="dynamics.integrator",
                     got=self.name,
-                    expected="a solid or plane element and a law with mean_stress and mean_tangent",
+                    expected="a law with mean_stress and mean_tangent",
                     cure="take generalized_alpha",
                 )
         super().__init__(equations, settings, x, v)
