@@ -54,11 +54,11 @@ def main() -> int:
             chosen = [name for name in programs if size != "480k" or name not in DIRECT or arguments.direct]
             report["results"][size] = _compare(SIZES[size], chosen, arguments.repetitions)
             _print(size, report["results"][size])
+            if arguments.json:
+                arguments.json.write_text(json.dumps(report, indent=1) + "\n")
     except AncfError as error:
         print(f"error: {error}", file=sys.stderr)
         return error.exit_code
-    if arguments.json:
-        arguments.json.write_text(json.dumps(report, indent=1) + "\n")
     return 0 if all(found["agree"] for found in report["results"].values()) else 1
 
 
@@ -75,7 +75,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--direct", action="store_true", help="direct solvers on the largest mesh too: many minutes"
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write what was measured")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what was measured, after each size")
     return parser.parse_args()
 
 

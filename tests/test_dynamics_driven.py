@@ -19,6 +19,7 @@ METHODS = {
     "rosenbrock": 0.01,
     "runge_kutta_5dp": 4e-4,
     "runge_kutta_4": 1e-3,
+    "central_difference": 5e-4,
 }
 
 
@@ -39,7 +40,7 @@ def test_every_method_keeps_driven_nodes_on_their_path(name):
         np.testing.assert_allclose(z, 0.1 * (1 - np.cos(np.pi * time / 0.1)) / 2, atol=1e-15)
 
 
-@pytest.mark.parametrize("name", ["generalized_alpha", "energy_momentum", "theta"])
+@pytest.mark.parametrize("name", ["generalized_alpha", "energy_momentum", "theta", "central_difference"])
 def test_driven_nodes_leave_the_order_as_it_is(name):
     """On a body so soft that the steps resolve all its modes: the cosine ramp begins with a jump of the
     acceleration.

@@ -33,8 +33,10 @@ STEPS = {
     "rosenbrock": 0.01,
     "runge_kutta_5dp": 4e-4,
     "runge_kutta_4": 1e-3,
+    "central_difference": 5e-4,
 }
-TOLERANCES = dict.fromkeys(STEPS, 1e-8) | {"runge_kutta_5dp": 1e-10, "runge_kutta_4": 1e-10}
+EXPLICIT = ("runge_kutta_5dp", "runge_kutta_4", "central_difference")
+TOLERANCES = dict.fromkeys(STEPS, 1e-8) | dict.fromkeys(EXPLICIT, 1e-10)
 
 
 @pytest.fixture(scope="module")

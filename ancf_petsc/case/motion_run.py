@@ -71,7 +71,7 @@ class MotionRun:
     # --- steps
 
     def _on_step(self, step: Step) -> None:
-        for name, count in zip(COUNTS, (step.newton, step.linear, 1, step.rejected), strict=True):
+        for name, count in zip(COUNTS, (step.newton, step.linear, step.count, step.rejected), strict=True):
             self.totals[name] += count
             self._since[name] += count
         if step.time in self.path.corners:

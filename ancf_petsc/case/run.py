@@ -92,10 +92,12 @@ def _compile(case: Case, comm: MPI.Comm) -> None:
     """Compile the kernels on the root rank, so that the others load them."""
     laws = [law_named(name) for name in sorted({material.law for material in case.spec.material})]
     row = element(case.spec.mesh.element)
-    mean = case.spec.dynamics is not None and case.spec.dynamics.integrator == "energy_momentum"
-    if comm.rank == 0 and not is_compiled(row, laws, mean=mean):
+    dynamics = case.spec.dynamics
+    moving = dynamics is not None
+    mean = dynamics is not None and dynamics.integrator == "energy_momentum"
+    if comm.rank == 0 and not is_compiled(row, laws, mean=mean, moving=moving):
         log.info("compiling kernels (%s): once, under half a minute", ", ".join(law.name for law in laws))
-    on_root(comm, lambda: compile_kernels(row, laws, mean=mean))
+    on_root(comm, lambda: compile_kernels(row, laws, mean=mean, moving=moving))
 
 
 def _solve(

@@ -33,6 +33,8 @@ class StopRequest:
 
     def asked(self) -> bool:
         """Whether any rank was asked to stop. Collective."""
+        if self.comm.size == 1:
+            return self._noted
         return bool(self.comm.allreduce(int(self._noted), MPI.MAX))
 
     def _note(self, number: int, frame: object) -> None:

@@ -12,6 +12,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME", nargs="?", help="which body; --list shows them")
     parser.add_argument("--size", type=float, metavar="H", help="length of edges in metres, meshed by Gmsh")
     parser.add_argument(
+        "--rim",
+        type=float,
+        metavar="H",
+        help="finer edges at the rims of bonded faces, growing away from them",
+    )
+    parser.add_argument(
         "--divisions",
         type=int,
         nargs=3,
@@ -51,6 +57,7 @@ def execute(arguments: argparse.Namespace) -> int:
         arguments.name,
         arguments.out or Path(f"{arguments.name}.msh"),
         size=arguments.size,
+        rim=arguments.rim,
         divisions=arguments.divisions,
         order=arguments.order,
         hexahedra=arguments.hexahedra,

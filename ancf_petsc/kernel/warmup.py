@@ -13,19 +13,22 @@ from ancf_petsc.kernel.choice import way_of
 from ancf_petsc.kernel.compiled import CACHE_FOLDER
 from ancf_petsc.kernel.constant import add_mass, add_mass_blocks, mass_product
 from ancf_petsc.kernel.graph import block_starts, neighbours
+from ancf_petsc.kernel.motion import MotionKernels
 from ancf_petsc.kernel.tables import nodes_with_slopes
 from ancf_petsc.material.models import Law
 
 
-def is_compiled(element: Element, laws: Sequence[Law], *, mean: bool = False) -> bool:
+def is_compiled(element: Element, laws: Sequence[Law], *, mean: bool = False, moving: bool = False) -> bool:
     """Whether the machine code of the element with all these laws is in the cache."""
-    return all(_mark(element, law, mean=mean).exists() for law in laws)
+    return all(_mark(element, law, mean=mean, moving=moving).exists() for law in laws)
 
 
-def compile_kernels(element: Element, laws: Sequence[Law], *, mean: bool = False) -> None:
+def compile_kernels(
+    element: Element, laws: Sequence[Law], *, mean: bool = False, moving: bool = False
+) -> None:
     """Compile the kernels of an element for each law, or load them from the cache.
 
-    mean: those between two states too, for the energy-momentum step.
+    mean: those between two states too, for the energy-momentum step. moving: the loops over steps of motions.
     """
     n, d = element.functions, element.cell.dimension
     cells = np.arange(n, dtype=np.int32).reshape(1, n)
@@ -47,7 +50,9 @@ def compile_kernels(element: Element, laws: Sequence[Law], *, mean: bool = False
             between = way.mean_kernels(law)
             between.force(positions, positions, *tables, p, 0, 1, force)
             between.tangent(positions, positions, *tables, p, 0, 1, *matrix)
-        _mark(element, law, mean=mean).touch()
+        if moving and way.motion is not None:
+            _compile_motion(way.motion(law), (*tables, p), positions, (pointers, columns))
+        _mark(element, law, mean=mean, moving=moving).touch()
     _compile_mass(element, cells, pointers, columns, driven, values)
 
 
@@ -71,7 +76,20 @@ def _compile_mass(element: Element, cells, pointers, columns, driven, values) ->
     add_mass_blocks(pointers, columns, mass, 1.0, pointers, none, 9 * n * n, driven, values)
 
 
-def _mark(element: Element, law: Law, *, mean: bool) -> Path:
+def _compile_motion(kernels: MotionKernels, body: tuple, x: NDArray, graph: tuple[NDArray, NDArray]) -> None:
+    n = len(x)
+    still, factors, patterns = np.zeros((n, 3)), np.zeros((1, 1)), np.zeros((1, n, 3))
+    mass = (np.zeros((0, 0, 0)), np.zeros(3, np.int64), still)
+    weighed = (*graph, np.zeros(len(graph[1])))
+    force, sums, values = np.empty((n, 3)), np.empty((3, n)), np.empty((n, 3))
+    y = np.stack((x, still))
+    y.setflags(write=False)  # as PETSc lends its arrays
+    kernels.rates(y, 0.0, body, factors[0], patterns, mass, force, sums, np.empty((2, n, 3)))
+    kernels.march(x.copy(), still, values, 0.0, 0.0, body, factors, patterns, mass, weighed, force, sums)
+    kernels.unbalance(y[0], y[1], 0.0, still, body, factors[0], patterns, weighed, force, values)
+
+
+def _mark(element: Element, law: Law, *, mean: bool, moving: bool) -> Path:
     """The file that says: compiled. Elements computed the same way share their machine code."""
     way = way_of(element).kernels.__module__.rpartition(".")[2]
-    return CACHE_FOLDER / f"{way}.{law.name}{'.mean' * mean}.compiled"
+    return CACHE_FOLDER / f"{way}.{law.name}{'.mean' * mean}{'.motion' * moving}.compiled"

@@ -29,6 +29,7 @@ class Body:
     build: adds the solid to Gmsh's OpenCASCADE model.
     grid: structured points (nz + 1, ny + 1, nx + 1, 3) from divisions (nx, ny, nz).
     size, divisions: what is made where nothing is asked for; size is the length of edges.
+    rims: planes of bonded faces and of roots, whose curves off the planes of symmetry meshes can be graded to.
     """
 
     about: str
@@ -38,6 +39,7 @@ class Body:
     edges: Edges
     size: float
     divisions: tuple[int, int, int]
+    rims: tuple[Plane, ...] = ()
 
 
 def _add_box(gmsh: Any, low: Sequence[float], high: Sequence[float]) -> None:
@@ -59,10 +61,11 @@ def box(
     edges: Edges | None = None,
     size: float,
     divisions: tuple[int, int, int],
+    rims: tuple[Plane, ...] = (),
 ) -> Body:
     """A box from its lowest to its highest corner."""
     build, grid = partial(_add_box, low=low, high=high), partial(_box_grid, low=low, high=high)
-    return Body(about, build, grid, faces, edges or {}, size, divisions)
+    return Body(about, build, grid, faces, edges or {}, size, divisions, rims)
 
 
 INNER, OUTER, HEIGHT = 0.025, 0.095, 0.1
@@ -109,6 +112,8 @@ QUARTER: Faces = {
     "symmetry_y": (("y", 0.0),),
 }
 
+BONDED: tuple[Plane, ...] = (("z", 0.0), ("z", 0.1))
+
 BODIES = {
     "pvc_block": Body(
         "quarter of a grooved ring 190 x 100 mm, bore 50, groove 25 deep and 20 wide (assumed geometry)",
@@ -118,6 +123,7 @@ BODIES = {
         {},
         0.01,
         (4, 8, 10),
+        (*BONDED, ("z", HEIGHT / 2)),
     ),
     "cube": box(
         "quarter block 50 x 50 x 100 mm",
@@ -126,6 +132,7 @@ BODIES = {
         faces=QUARTER,
         size=0.005,
         divisions=(5, 5, 10),
+        rims=BONDED,
     ),
     "bar": box(
         "bar 0.1 x 0.1 x 0.5 m hanging along z",
@@ -135,6 +142,7 @@ BODIES = {
         edges={"bottom_edges": _perimeter(-0.5, (0, 0.1), (0, 0.1))},
         size=0.05,
         divisions=(2, 2, 10),
+        rims=(("z", 0.0),),
     ),
     "pendulum": box(
         "pendulum 0.5 x 0.1 x 0.1 m along x, hinged at an upper edge",
@@ -170,5 +178,6 @@ BODIES = {
         faces={"clamp": (("x", 0.0),), "end": (("x", 1.0),)},
         size=0.05,
         divisions=(20, 2, 2),
+        rims=(("x", 0.0),),
     ),
 }

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,14 @@ ON_PLANE = 1e-9
 """Nodes closer to a plane than this times the size of the body are on it."""
 
 VERSIONS = ("2.2", "4.1")
+GROWTH = 0.5
+"""Of the length of edges with the distance from a rim."""
+
+SAMPLING = 400
+"""Points along a curve that distances are taken to."""
+
+BOX_MARGIN = 1e-6
+"""Metres by which Gmsh's boxes of curves are too large."""
 
 
 def make_mesh(
@@ -28,6 +37,7 @@ def make_mesh(
     path: str | Path,
     *,
     size: float | None = None,
+    rim: float | None = None,
     divisions: Sequence[int] | None = None,
     order: int = 1,
     hexahedra: bool = False,
@@ -38,12 +48,13 @@ def make_mesh(
 
     flat: "quad" for the section of a box half way along y, "line" for its axis along x, with the groups that cut them.
 
-    size: length of edges of an unstructured mesh. divisions: bricks (nx, ny, nz) of a structured one, for
+    size: length of edges of an unstructured mesh, rim: at rims of bonded faces and roots, where stresses are
+    singular; edges grow with the distance from them. divisions: bricks (nx, ny, nz) of a structured one, for
     pvc_block across the wall, around, over the height. order 2 adds mid-nodes on straight edges.
     Raises CaseError where this cannot be made.
     """
     body = _checked_request(
-        name, size=size, divisions=divisions, order=order, hexahedra=hexahedra, version=version
+        name, size=size, rim=rim, divisions=divisions, order=order, hexahedra=hexahedra, version=version
     )
     path = Path(path)
     if path.suffix != ".msh":
@@ -54,7 +65,7 @@ def make_mesh(
         _write(path, *_flat(body, body.divisions if divisions is None else divisions, flat), order, version)
         return path
     if divisions is None and not hexahedra:
-        points, cells = _unstructured(body, body.size if size is None else size)
+        points, cells = _unstructured(body, body.size if size is None else size, rim)
     else:
         points, cells = bricks(body.grid(body.divisions if divisions is None else divisions))
         if not hexahedra:
@@ -69,6 +80,7 @@ def _checked_request(
     name: str,
     *,
     size: float | None,
+    rim: float | None,
     divisions: Sequence[int] | None,
     order: int,
     hexahedra: bool,
@@ -81,6 +93,8 @@ def _checked_request(
         raise CaseError("bricks have divisions, not a size", key="--size", got=size, cure=cure)
     if size is not None and not 0 < size < np.inf:
         raise CaseError(key="--size", got=size, expected="a length in metres above 0")
+    if rim is not None:
+        _check_rim(name, rim, size, structured=divisions is not None or hexahedra)
     if divisions is not None and not (len(divisions) == 3 and all(count >= 1 for count in divisions)):
         raise CaseError(key="--divisions", got=list(divisions), expected="three numbers from 1")
     if order not in (1, 2) or (order == 2 and hexahedra):
@@ -90,12 +104,28 @@ def _checked_request(
     return BODIES[name]
 
 
-def _unstructured(body: Body, size: float) -> tuple[Floats, Integers]:
+def _check_rim(name: str, rim: float, size: float | None, *, structured: bool) -> None:
+    body = BODIES[name]
+    if structured:
+        raise CaseError("bricks have divisions, not a size", key="--rim", got=rim, cure="give --size")
+    if not body.rims:
+        having = ", ".join(other for other in BODIES if BODIES[other].rims)
+        raise CaseError(f"{name} has no bonded face", key="--rim", got=rim, expected=f"one of {having}")
+    largest = body.size if size is None else size
+    if not 0 < rim <= largest:
+        raise CaseError(
+            key="--rim", got=rim, expected=f"a length in metres above 0, at most --size {largest:g}"
+        )
+
+
+def _unstructured(body: Body, size: float, rim: float | None) -> tuple[Floats, Integers]:
     """Points (n, 3) and tetrahedra (e, 4) by Gmsh, in its numbering."""
-    options = {"Mesh.MeshSizeMin": size, "Mesh.MeshSizeMax": size}
+    options = {"Mesh.MeshSizeMin": rim or size, "Mesh.MeshSizeMax": size}
     with gmsh_session(**options) as gmsh:
         body.build(gmsh)
         gmsh.model.occ.synchronize()
+        if rim is not None:
+            grade(gmsh, _rim_curves(gmsh, body), size, rim)
         try:
             gmsh.model.mesh.generate(3)
         except Exception as error:
@@ -105,8 +135,42 @@ def _unstructured(body: Body, size: float) -> tuple[Floats, Integers]:
         numbers, coordinates, _ = gmsh.model.mesh.getNodes()
         _, nodes = gmsh.model.mesh.getElementsByType(KINDS["tetra"].gmsh)
     order = np.argsort(numbers)
-    cells = np.searchsorted(numbers[order], nodes).reshape(-1, 4)
-    return coordinates.reshape(-1, 3)[order], cells
+    cells = np.searchsorted(numbers[order], nodes)
+    used, cells = np.unique(cells, return_inverse=True)
+    return coordinates.reshape(-1, 3)[order[used]], cells.reshape(-1, 4)
+
+
+def grade(gmsh: Any, curves: Sequence[int], size: float, rim: float) -> None:
+    """Let edges grow from `rim` at the curves with the distance from them, to `size`."""
+    field = gmsh.model.mesh.field
+    distance, length = field.add("Distance"), field.add("Threshold")
+    field.setNumbers(distance, "CurvesList", curves)
+    field.setNumber(distance, "Sampling", SAMPLING)
+    values = {
+        "InField": distance,
+        "SizeMin": rim,
+        "SizeMax": size,
+        "DistMin": 0,
+        "DistMax": (size - rim) / GROWTH,
+    }
+    for name, value in values.items():
+        field.setNumber(length, name, value)
+    field.setAsBackgroundMesh(length)
+    for source in ("ExtendFromBoundary", "FromPoints", "FromCurvature"):
+        gmsh.option.setNumber(f"Mesh.MeshSize{source}", 0)
+
+
+def _rim_curves(gmsh: Any, body: Body) -> list[int]:
+    """Curves of the model on planes of rims and on none of symmetry."""
+    symmetry = [planes for name, planes in body.faces.items() if name.startswith("symmetry")]
+    found = []
+    for dimension, tag in gmsh.model.getEntities(1):
+        box = np.array(gmsh.model.getBoundingBox(dimension, tag)).reshape(2, 3)
+        on = [np.allclose(box[:, "xyz".index(a)], level, atol=BOX_MARGIN) for a, level in body.rims]
+        cut = [np.allclose(box[:, "xyz".index(a)], level, atol=BOX_MARGIN) for (a, level), *_ in symmetry]
+        if any(on) and not any(cut):
+            found.append(tag)
+    return found
 
 
 def bricks(grid: Floats) -> tuple[Floats, Integers]:

@@ -55,8 +55,8 @@ class TimeIntegration:
                 self.on_corner(end)
 
     def _goals(self, begin: float, end: float) -> list[float]:
-        """Ends of fixed steps, equal within the interval; its end alone where the method adapts."""
-        if self.integrator.adaptive:
+        """Ends of fixed steps, equal within the interval; its end alone where the method leaps."""
+        if self.integrator.leaps:
             return [end]
         parts = steps_in(end - begin, self.integrator.settings.step)
         return [begin + (end - begin) * k / parts for k in range(1, parts)] + [end]

@@ -6,10 +6,13 @@ jumps, and with the consistent mass the free nodes beside them get their share o
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ancf_petsc.solve.fused import FusedMotion
 from ancf_petsc.solve.mass_solver import MassSolver
 from ancf_petsc.system.assembly import Assembly
 from ancf_petsc.system.mass import Mass
@@ -38,6 +41,13 @@ class Equations:
     def destroy(self) -> None:
         """Free PETSc's objects."""
         self.solver.destroy()
+
+    @cached_property
+    def fused(self) -> FusedMotion | None:
+        """The motion in compiled loops, where the body is simple enough."""
+        if not FusedMotion.fits(self.mass, self.solver, moving=self.moving):
+            return None
+        return FusedMotion(self.mass, self.solver, self.damping, self.duration)
 
     # --- what is prescribed
 

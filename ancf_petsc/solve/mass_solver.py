@@ -23,7 +23,7 @@ ACCURACY = 1e-13
 
 class MassSolver:
     """Solves M a = b on the free degrees of freedom; driven ones get 0. way: inverse, cholesky, chebyshev;
-    None chooses.
+    None chooses. is_inverted: whether there is an `explicit_inverse`.
     """
 
     def __init__(self, mass: Mass, way: str | None = None) -> None:
@@ -31,6 +31,7 @@ class MassSolver:
         model = mass.assembly.model
         self.free = model.motion[: model.owned] < 0
         way = way or self._choose()
+        self.is_inverted = mass.lumped or way == "inverse"
         self._factors = [] if way == "chebyshev" else self._factor(_Inverse if way == "inverse" else _Factor)
         root = sqrt(mass.bounds[1] / mass.bounds[0])
         self._iterations = 1 if mass.lumped else ceil(log(ACCURACY / 2) / log((root - 1) / (root + 1)))
@@ -45,6 +46,19 @@ class MassSolver:
                 factor.solve(b, result)
             return result
         return self._chebyshev(b)
+
+    def explicit_inverse(self) -> tuple[NDArray, NDArray, NDArray]:
+        """Of a mass that `is_inverted`: inverses (k, n, n), the one that serves each component (3,), and 1 /
+        mass (n, 3), 0 where driven. A lumped mass has the last alone.
+        """
+        share = self.free / self.mass.diagonal[:, None]
+        which = np.zeros(3, np.int64)
+        if self.mass.lumped:
+            return np.zeros((0, 0, 0)), which, share
+        inverses = [factor for factor in self._factors if isinstance(factor, _Inverse)]
+        for k, factor in enumerate(inverses):
+            which[factor.axes] = k
+        return np.array([factor.inverse for factor in inverses]), which, share
 
     def destroy(self) -> None:
         """Free PETSc's objects."""
@@ -90,11 +104,11 @@ class _Inverse:
 
     def __init__(self, matrix: csr_array, rows: NDArray, axes: list[int], total: int) -> None:
         self.axes = slice(None) if len(axes) == 3 else axes
-        self._inverse = np.zeros((total, total))
-        self._inverse[np.ix_(rows, rows)] = np.linalg.inv(matrix.toarray())
+        self.inverse = np.zeros((total, total))
+        self.inverse[np.ix_(rows, rows)] = np.linalg.inv(matrix.toarray())
 
     def solve(self, b: NDArray, into: NDArray) -> None:
-        into[:, self.axes] = self._inverse @ b[:, self.axes]
+        into[:, self.axes] = self.inverse @ b[:, self.axes]
 
     def destroy(self) -> None:
         """There is nothing of PETSc's."""

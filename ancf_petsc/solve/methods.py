@@ -27,6 +27,7 @@ METHODS = {
     for row in (
         Method("generalized_alpha", "generalized_alpha.GeneralizedAlpha", option="spectral_radius"),
         Method("energy_momentum", "energy_momentum.EnergyMomentum"),
+        Method("central_difference", "central_difference.CentralDifference"),
         Method("runge_kutta_5dp", "runge_kutta.RungeKutta5dp", adaptive=True),
         Method("runge_kutta_4", "runge_kutta.RungeKutta4"),
         Method("rosenbrock", "rosenbrock.Rosenbrock", adaptive=True),

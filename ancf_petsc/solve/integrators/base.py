@@ -28,7 +28,9 @@ class Settings:
 
 @dataclass(frozen=True)
 class Step:
-    """An accepted step. known: external work and loss in it, where the method has them exactly."""
+    """An accepted step, or `count` of them at once. known: external work and loss in it, where the method has
+    them exactly.
+    """
 
     time: float
     size: float
@@ -36,6 +38,7 @@ class Step:
     linear: int = 0
     rejected: int = 0
     known: tuple[float, float] | None = None
+    count: int = 1
 
 
 class Integrator(ABC):
@@ -65,13 +68,18 @@ class Integrator(ABC):
         return self.settings.step == 0.0
 
     @property
+    def leaps(self) -> bool:
+        """Whether `advance` goes on to its goal by itself, in one call or several."""
+        return self.adaptive
+
+    @property
     def longest_stable(self) -> float | None:
         """The longest stable fixed step of an explicit method; None for implicit ones."""
         return None
 
     @abstractmethod
     def advance(self, goal: float) -> Step:
-        """One step: to `goal`, or, where the method adapts, at most to `goal`. Raises MotionStopped."""
+        """One step: to `goal`, or, where the method leaps, at most to `goal`. Raises MotionStopped."""
 
     def restart(self) -> None:
         """Forget what was before: the velocity jumped. The state has been set."""

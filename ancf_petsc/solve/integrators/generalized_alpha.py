@@ -8,6 +8,7 @@ motion.
 
 from __future__ import annotations
 
+import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -28,6 +29,7 @@ class GeneralizedAlpha(OneStep):
         self.gamma = 0.5 + self.alpha_m - self.alpha_f
         self.beta = 0.25 * (1 + self.alpha_m - self.alpha_f) ** 2
         super().__init__(equations, settings, x, v)
+        self._still = np.zeros((0, 3))
         self.restart()
 
     def restart(self) -> None:
@@ -38,29 +40,41 @@ class GeneralizedAlpha(OneStep):
         h, v = self.h, self.v.array_r.reshape(-1, 3)
         a1 = (d - h * v) / (self.beta * h * h) - (0.5 / self.beta - 1) * self.a
         v1 = v + h * ((1 - self.gamma) * self.a + self.gamma * a1)
-        driven = self.equations.assembly.driven
-        if len(driven):
+        if self.equations.moving:
+            driven = self.equations.assembly.driven
             a1.ravel()[driven] = self.equations.driven_accelerations(self.goal)
             v1.ravel()[driven] = self.equations.driven_velocities(self.goal)
         return v1, a1
 
+    def guess(self) -> NDArray:
+        self._still = self._carried_by(np.zeros_like(self.a))
+        h = self.h
+        return h * self.v.array_r.reshape(-1, 3) + h * h / 2 * self.a
+
     def forces(self, d: PETSc.Vec) -> Forces:
-        eq, part, time = self.equations, self.alpha_f, self.time + self.alpha_f * self.h
-        v1, a1 = self._ends(d.array_r.reshape(-1, 3))
-        v = self.v.array_r.reshape(-1, 3)
+        part, time = self.alpha_f, self.time + self.alpha_f * self.h
+        carried = self._inertia * d.array_r.reshape(-1, 3)
+        if self.equations.moving:
+            carried.ravel()[self.equations.assembly.driven] = 0.0
+        carried += self._still
+        values, squared = self.unbalance(time, d, part, carried)
+        return Forces(values / part, squared / part**2)
+
+    def _carried_by(self, d: NDArray) -> NDArray:
+        """What the mass is multiplied with, (n, 3); it grows with `_inertia` times the increment."""
+        damping, part = self.equations.damping, self.alpha_f
+        v1, a1 = self._ends(d)
         carried = (1 - self.alpha_m) * self.a + self.alpha_m * a1
-        if eq.damping:
-            carried += eq.damping * ((1 - part) * v + part * v1)
-        inertia, loads = eq.mass.times(carried), eq.loads(time)
-        internal, _ = eq.assembly.internal_force(self.between(d, part))
-        values = (inertia + internal - loads) / part
-        return Forces(values, self.squared(inertia, internal, loads) / part**2)
+        return carried + damping * ((1 - part) * self.v.array_r.reshape(-1, 3) + part * v1)
+
+    @property
+    def _inertia(self) -> float:
+        inertia = self.alpha_m / (self.beta * self.h**2)
+        return inertia + self.equations.damping * self.alpha_f * self.gamma / (self.beta * self.h)
 
     def tangent(self, d: PETSc.Vec, matrix: PETSc.Mat) -> None:
-        part, h = self.alpha_f, self.h
-        factor = self.alpha_m / part / (self.beta * h * h)
-        factor += self.equations.damping * self.gamma / (self.beta * h)
-        mass = self.equations.mass
+        part, mass = self.alpha_f, self.equations.mass
+        factor = self._inertia / part
         self.equations.assembly.tangent(self.between(d, part), matrix, lambda: mass.add_to_matrix(factor))
 
     def finish(self, d: NDArray) -> None:

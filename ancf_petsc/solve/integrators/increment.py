@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import isfinite, sqrt
 
 import numpy as np
 from mpi4py import MPI
@@ -60,17 +61,21 @@ class ForceTest:
 
     def __call__(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         residual = norms[2]
-        if not np.isfinite(residual):
+        if not isfinite(residual):
             return Reason.DIVERGED_FNORM_NAN
-        forces = np.sqrt(self.equations.comm.allreduce(self.scale, MPI.SUM))
-        floor = ROUNDING * self.equations.assembly.largest_diagonal * self.x.norm()
+        comm = self.equations.comm
+        forces = sqrt(self.scale if comm.size == 1 else comm.allreduce(self.scale, MPI.SUM))
         relative, absolute = snes.getTolerances()[:2]
         if iteration:
             self.aged = self.aged or residual > SLOW * self._before
         self._before = residual
-        if residual <= max(relative * forces, floor, absolute):
+        if residual <= max(relative * forces, absolute) or residual <= self._rounding():
             return Reason.CONVERGED_FNORM_RELATIVE
         return Reason.ITERATING
+
+    def _rounding(self) -> float:
+        """What the rounding of positions leaves of forces. Collective."""
+        return ROUNDING * self.equations.assembly.largest_diagonal * self.x.norm()
 
 
 class IncrementSolver:
@@ -153,10 +158,10 @@ class IncrementSolver:
 
     def _function(self, snes: PETSc.SNES, d: PETSc.Vec, f: PETSc.Vec) -> None:
         forces = self.forces(d)
-        values = forces.values.ravel()
+        values = f.array_w
+        values[:] = forces.values.ravel()
         values[self.assembly.driven] = 0.0
         self.test.note_scale(forces.scale)
-        f.array[:] = values
 
     def _jacobian(self, snes: PETSc.SNES, d: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
         if self.test.aged or self._always_new:

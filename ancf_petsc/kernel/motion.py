@@ -1,0 +1,198 @@
+"""Motion of element 3413 in compiled loops: rates of change, whole steps of the central difference, and the
+balance of an implicit step.
+
+For a body of one material on one rank, whose driven degrees of freedom rest: what a step costs is then its
+arithmetic, not the interpreter's. Arrays as in `tet3413`, with n nodal vectors:
+    x, v, a (n, 3)        positions, velocities, accelerations
+    factors (m, l)        of the loads at m times, patterns (l, n, 3) of the loads
+    inverse (k, n, n)     inverses of the consistent mass of free nodes, zero elsewhere; none with lumped mass
+    which (3,)            the inverse that serves each component
+    share (n, 3)          1 / mass of free components, 0 of driven ones: the inverse of a lumped mass
+    pointers, columns, values  the mass, one number for a pair of nodes
+    force (n, 3), sums (3, n)  overwritten
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+from numba.extending import register_jitable
+
+from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.kernel.tet3413 import edge_sum, scatter_force
+from ancf_petsc.material.models import Law
+
+
+class MotionKernels(NamedTuple):
+    """The compiled loops of one law."""
+
+    rates: Callable
+    march: Callable
+    unbalance: Callable
+
+
+@register_jitable
+def solve_mass(inverse, which, share, force, sums, a):
+    """Accelerations (n, 3) of forces (n, 3)."""
+    n = force.shape[0]
+    if inverse.shape[0] == 0:
+        for i in range(n):
+            for c in range(3):
+                a[i, c] = share[i, c] * force[i, c]
+        return
+    for c in range(3):
+        row, matrix = sums[c], inverse[which[c]]
+        row[:] = 0.0
+        for j in range(n):
+            f, column = force[j, c], matrix[j]
+            for i in range(n):
+                row[i] += column[i] * f
+    for i in range(n):
+        for c in range(3):
+            a[i, c] = sums[c, i]
+
+
+@register_jitable
+def load(factors, patterns, i, c):
+    """Of all loads on a component."""
+    total = 0.0
+    for k in range(factors.size):
+        total += factors[k] * patterns[k, i, c]
+    return total
+
+
+@register_jitable
+def drift(x, v, a, h):
+    """Velocities at the middle of a step, positions at its end."""
+    for i in range(x.shape[0]):
+        for c in range(3):
+            v[i, c] += h / 2 * a[i, c]
+            x[i, c] += h * v[i, c]
+
+
+@register_jitable
+def kick(v, a, h, damping):
+    """Velocities at the end of a step from undamped accelerations, which become the damped ones."""
+    for i in range(v.shape[0]):
+        for c in range(3):
+            v[i, c] = (v[i, c] + h / 2 * a[i, c]) / (1.0 + damping * h / 2)
+            a[i, c] -= damping * v[i, c]
+
+
+@register_jitable
+def power(factors, patterns, v):
+    """Of the loads at velocities v."""
+    total = 0.0
+    for k in range(factors.size):
+        for i in range(v.shape[0]):
+            for c in range(3):
+                total += factors[k] * patterns[k, i, c] * v[i, c]
+    return total
+
+
+@register_jitable
+def kinetic_square(pointers, columns, values, v):
+    """v . M v."""
+    total = 0.0
+    for i in range(pointers.size - 1):
+        x = y = z = 0.0
+        for k in range(pointers[i], pointers[i + 1]):
+            j, m = columns[k], values[k]
+            x += m * v[j, 0]
+            y += m * v[j, 1]
+            z += m * v[j, 2]
+        total += x * v[i, 0] + y * v[i, 1] + z * v[i, 2]
+    return total
+
+
+@cache
+def make_motion_kernels(law: Law) -> MotionKernels:
+    """Compiled loops for one law."""
+    balance = balance_of(law.stress)
+    return MotionKernels(rates_kernel(balance), march_kernel(balance), unbalance_kernel(balance))
+
+
+def balance_of(stress: Callable) -> Callable:
+    """The loop over forces, to stand in others."""
+
+    @register_jitable
+    def balance(x, body, factors, patterns, force):
+        """force (n, 3): loads less internal forces."""
+        cells, gradients, volumes, parameters = body
+        force[:] = 0.0
+        for e in range(cells.shape[0]):
+            nodes, G = cells[e], gradients[e]
+            scatter_force(force, nodes, stress(edge_sum(x, nodes, G), parameters), -volumes[e], G)
+        for i in range(force.shape[0]):
+            for c in range(3):
+                force[i, c] += load(factors, patterns, i, c)
+
+    return balance
+
+
+def rates_kernel(balance: Callable) -> Callable:
+    """Rates of change."""
+
+    @kernel
+    def rates(y, damping, body, factors, patterns, mass, force, sums, f):
+        """f = dy/dt of y = (x, v), both (2, n, 3): velocities and accelerations, 0 where driven."""
+        inverse, which, share = mass
+        balance(y[0], body, factors, patterns, force)
+        solve_mass(inverse, which, share, force, sums, f[1])
+        for i in range(y.shape[1]):
+            for c in range(3):
+                f[0, i, c] = y[1, i, c]
+                f[1, i, c] -= damping * y[1, i, c]
+
+    return rates
+
+
+def march_kernel(balance: Callable) -> Callable:
+    """Whole steps of the central difference."""
+
+    @kernel
+    def march(x, v, a, h, damping, body, factors, patterns, mass, graph, force, sums):
+        """As many steps h as factors has rows but one; x, v, a move on. Returns work of the loads and loss.
+
+        v at half a step: v + h/2 a; x + h v; then a at the end, where the damping is implicit.
+        """
+        inverse, which, share = mass
+        pointers, columns, values = graph
+        work = loss = 0.0
+        for step in range(factors.shape[0] - 1):
+            drift(x, v, a, h)
+            work += h * power((factors[step] + factors[step + 1]) / 2, patterns, v)
+            if damping != 0.0:
+                loss += h * damping * kinetic_square(pointers, columns, values, v)
+            balance(x, body, factors[step + 1], patterns, force)
+            solve_mass(inverse, which, share, force, sums, a)
+            kick(v, a, h, damping)
+        return work, loss
+
+    return march
+
+
+def unbalance_kernel(balance: Callable) -> Callable:
+    """The balance of an implicit step."""
+
+    @kernel
+    def unbalance(x, d, part, carried, body, factors, patterns, graph, force, values):
+        """values (n, 3): M carried + Q(x + part d) - Q_e. Returns the sum of the squares of the three."""
+        pointers, columns, masses = graph
+        for i in range(x.shape[0]):
+            for c in range(3):
+                values[i, c] = x[i, c] + part * d[i, c]
+        balance(values, body, factors, patterns, force)
+        total = 0.0
+        for i in range(x.shape[0]):
+            for c in range(3):
+                inertia, given = 0.0, load(factors, patterns, i, c)
+                for k in range(pointers[i], pointers[i + 1]):
+                    inertia += masses[k] * carried[columns[k], c]
+                values[i, c] = inertia - force[i, c]
+                total += inertia**2 + (given - force[i, c]) ** 2 + given**2
+        return total
+
+    return unbalance
