@@ -9,13 +9,15 @@ import meshio
 import numpy as np
 from mpi4py import MPI
 
-from ancf_petsc import case_from_dict
+from ancf_petsc import case_from_dict, run
 from ancf_petsc.case.build import build
-from ancf_petsc.element.catalog import element
+from ancf_petsc.element.catalog import ELEMENTS, element
+from ancf_petsc.element.shape import cartesian_values
 from ancf_petsc.mesh.generate import bricks, make_mesh
 from ancf_petsc.mesh.kinds import KUHN
 from ancf_petsc.system.assembly import Assembly
 
+REFERENCE = Path(__file__).parent / "reference"
 SECTION = {"thickness": 0.1, "plane": "stress"}
 
 
@@ -103,3 +105,47 @@ def _write_with_sides(path: Path, points: Any, kind: str, cells: Any, sides: Any
         cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
         field_data={"boundary": np.array([1, dimension]), "solid": np.array([2, dimension + 1])},
     ).write(path, file_format="gmsh22", binary=False)
+
+
+def motion(mesh: Path, code: str, duration: float, **dynamics: Any) -> dict[str, Any]:
+    """A hinged body of the pendulum's material that falls from rest."""
+    return {
+        "title": f"Pendulum of {code}",
+        "mesh": {"file": str(mesh), "element": code},
+        "material": {"law": "svk", "young": 2e6, "poisson": 0.3, "density": 7800.0},
+        "constraint": [{"group": "hinge", "fix": ["x", "y", "z"]}],
+        "load": [{"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}],
+        "dynamics": {"duration": duration, "outputs": round(100 * duration) or 1, **dynamics},
+        "probe": [{"name": "tip", "group": "tip", "mean": "area"}],
+    }
+
+
+def point(results: Any, code: str, xi: Any) -> Any:
+    """Positions (steps, 3) of a point of the first cell, from the nodal vectors in the results."""
+    row = ELEMENTS[code]
+    nodes = results.cells[0, : len(row.cell.corners)]
+    jacobian = row.geometry(results.points[nodes][None]).jacobian
+    values = cartesian_values(row.values(np.array([xi])), row.slot, jacobian)[0, 0]
+    track = []
+    for step in range(len(results.times)):
+        now = (results.points + results.field("displacement", step))[nodes]
+        slopes = results.field("slopes", step)[nodes].reshape(len(nodes), 3, 3)
+        track.append(
+            values @ np.concatenate((now[:, None], np.swapaxes(slopes, 1, 2)), axis=1).reshape(-1, 3)
+        )
+    return np.array(track)
+
+
+def reference_fall(name: str) -> tuple[Any, Any]:
+    """Times (t,) and centroids (t, 3) of the end section in a file of tests/reference."""
+    table = np.genfromtxt(REFERENCE / name, delimiter=",", names=True)
+    return table["t"], np.stack([table[axis] for axis in "xyz"], axis=1)
+
+
+def fall_of_one_brick(rule: str, folder: Path) -> tuple[Any, Any]:
+    """Times (t,) and centroids (t, 3) of the end section of the pendulum as one 3843 that falls for a second."""
+    mesh = mesh_of("pendulum", "3843", (1, 1, 1), folder)
+    data = motion(mesh, "3843", 1.0, integrator="runge_kutta_5dp", tolerance=1e-8)
+    data["mesh"]["rule"] = rule
+    results = run(case_from_dict(data, folder), folder / "run")
+    return np.array(results.times), point(results, "3843", [0.5, 0.0, 0.0])

@@ -1,61 +1,16 @@
 """Elements with slopes, in the plane and beams in motion and at rest, against independent answers."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from family import SECTION, mesh_of, unit_cube
+from family import SECTION, fall_of_one_brick, mesh_of, motion, reference_fall, unit_cube
 
 from ancf_petsc import case_from_dict, run
-from ancf_petsc.element.catalog import ELEMENTS
-from ancf_petsc.element.shape import cartesian_values
-
-REFERENCE = Path(__file__).parent / "reference"
-
-
-def motion(mesh, code, duration, **dynamics):
-    return {
-        "title": f"Pendulum of {code}",
-        "mesh": {"file": str(mesh), "element": code},
-        "material": {"law": "svk", "young": 2e6, "poisson": 0.3, "density": 7800.0},
-        "constraint": [{"group": "hinge", "fix": ["x", "y", "z"]}],
-        "load": [{"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}],
-        "dynamics": {"duration": duration, "outputs": round(100 * duration) or 1, **dynamics},
-        "probe": [{"name": "tip", "group": "tip", "mean": "area"}],
-    }
-
-
-def point(results, code, xi):
-    """Positions (steps, 3) of a point of the first cell, from the nodal vectors in the results."""
-    row = ELEMENTS[code]
-    nodes = results.cells[0, : len(row.cell.corners)]
-    jacobian = row.geometry(results.points[nodes][None]).jacobian
-    values = cartesian_values(row.values(np.array([xi])), row.slot, jacobian)[0, 0]
-    track = []
-    for step in range(len(results.times)):
-        now = (results.points + results.field("displacement", step))[nodes]
-        slopes = results.field("slopes", step)[nodes].reshape(len(nodes), 3, 3)
-        track.append(
-            values @ np.concatenate((now[:, None], np.swapaxes(slopes, 1, 2)), axis=1).reshape(-1, 3)
-        )
-    return np.array(track)
-
-
-def reference_fall(name):
-    """Times (t,) and centroids (t, 3) of the end section in a file of tests/reference."""
-    table = np.genfromtxt(REFERENCE / name, delimiter=",", names=True)
-    return table["t"], np.stack([table[axis] for axis in "xyz"], axis=1)
 
 
 @pytest.fixture(scope="module", params=["default", "exact"])
 def fall(request, tmp_path_factory):
     """Name of the rule, times and centroids of the end section of one brick that falls for a second."""
-    folder = tmp_path_factory.mktemp(request.param)
-    mesh = mesh_of("pendulum", "3843", (1, 1, 1), folder)
-    data = motion(mesh, "3843", 1.0, integrator="runge_kutta_5dp", tolerance=1e-8)
-    data["mesh"]["rule"] = request.param
-    results = run(case_from_dict(data, folder), folder / "run")
-    return request.param, np.array(results.times), point(results, "3843", [0.5, 0.0, 0.0])
+    return request.param, *fall_of_one_brick(request.param, tmp_path_factory.mktemp(request.param))
 
 
 def test_one_brick_with_slopes_falls_as_another_code_computed_it(fall):
