@@ -1,16 +1,24 @@
 """The walks of CONTRIBUTING.md: what a newcomer would add is added as it stands there, and computes."""
 
+import inspect
 import sys
+from itertools import product
 from types import ModuleType
 
 import numba
 import numpy as np
 import pytest
+import test_element_rank
+import test_element_shape
+import test_family_dynamics
+import test_family_orders
+import test_kernel_generic
+from element_cells import SHAPES
+from tiny_meshes import quadratic_bricks
 
 from ancf_petsc import case_from_dict, cli, load_case, run
 from ancf_petsc.element import catalog
 from ancf_petsc.element.element import Element
-from ancf_petsc.element.shape import complete_polynomials
 from ancf_petsc.material import models
 from ancf_petsc.mesh.generate import make_mesh
 from ancf_petsc.solve import methods
@@ -23,40 +31,80 @@ def code_of(project, heading):
     return section.split("```python\n")[1].split("```")[0]
 
 
-def test_an_element_is_a_row(project):
-    """The new row reproduces what it claims on its reference cell, and its mass is the cell's."""
-    element = eval(code_of(project, "Add an element"), {"Element": Element})
-    tables = element.tables("mass")
-    for exponents in complete_polynomials(3, element.complete):
-        nodal = np.prod(element.node_coordinates**exponents, axis=1)
-        wanted = np.prod(tables.points**exponents, axis=1)
-        # Rounding of 20 terms of size 1.
-        np.testing.assert_allclose(tables.values @ nodal, wanted, rtol=0, atol=1e-14)
-    mass = np.einsum("q,qa,qb->ab", tables.weights, tables.values, tables.values)
-    assert mass.sum() == pytest.approx(float(element.cell.volume), rel=1e-14)
-    assert np.linalg.matrix_rank(mass) == element.functions
-
-
-def test_the_new_element_runs_in_the_program(project, monkeypatch, tmp_path):
-    """A beam under its own weight: reactions carry it, and it sags as Euler and Bernoulli say."""
+@pytest.fixture
+def new_element(project, monkeypatch):
+    """The row of the guide, in the catalogue; its code."""
     row = eval(code_of(project, "Add an element"), {"Element": Element})
     monkeypatch.setitem(catalog.ELEMENTS, row.code, row)
+    monkeypatch.setitem(test_family_orders.LADDERS, row.code, (2, 4, 2 * row.complete))
     catalog.element.cache_clear()
-    mesh = make_mesh("cantilever", tmp_path / "bar.msh", divisions=(8, 1, 1), hexahedra=True)
-    data = {
-        "title": "Bar",
-        "mesh": {"file": str(mesh), "element": row.code},
-        "material": {"law": "svk", "young": 1e7, "poisson": 0.3, "density": 1000.0},
-        "constraint": [{"group": "clamp", "fix": ["x", "y", "z"]}],
-        "load": [{"type": "gravity", "acceleration": [0.0, 0.0, -1.0]}],
-        "statics": {"steps": 1},
-        "probe": [{"name": "end", "group": "end", "mean": "area"}],
-    }
-    results = run(case_from_dict(data, tmp_path), tmp_path / "run")
+    yield row.code
     catalog.element.cache_clear()
-    assert results.curve["clamp.rz"][-1] == pytest.approx(10.0, rel=1e-9)
+
+
+HOMES = (test_element_shape, test_element_rank, test_kernel_generic, test_family_orders, test_family_dynamics)
+RULES = ("default", "exact")
+CHOICES = {
+    "shape": SHAPES,
+    "law": tuple(models.LAWS.values()),
+    "name": RULES,
+    "quadrature": RULES,
+    "rule": RULES,
+}
+
+
+def property_tests():
+    """The tests of other files that take the code of an element, and beside it what CHOICES has."""
+    for home in HOMES:
+        for name, function in inspect.getmembers(home, inspect.isfunction):
+            taken = set(inspect.signature(function).parameters)
+            if name.startswith("test_") and "code" in taken and taken <= {"code", "tmp_path", *CHOICES}:
+                yield pytest.param(function, id=f"{home.__name__}::{name}")
+
+
+@pytest.mark.parametrize("function", property_tests())
+def test_all_that_elements_must_do_the_new_one_does(function, new_element, tmp_path):
+    """Whatever the tests of the catalogue ask, with every cell, law and quadrature they ask it for."""
+    taken = inspect.signature(function).parameters
+    keys = [key for key in CHOICES if key in taken]
+    by_name = function is test_family_dynamics.test_energy_and_momenta_of_a_free_body_stay
+    for number, chosen in enumerate(product(*(CHOICES[key] for key in keys))):
+        values = dict(zip(keys, chosen, strict=True))
+        if by_name:
+            values["law"] = values["law"].name
+        if "tmp_path" in taken:
+            values["tmp_path"] = tmp_path / str(number)
+            values["tmp_path"].mkdir()
+        function(code=new_element, **values)
+
+
+def test_the_properties_are_found():
+    """A renamed parameter would leave a test out."""
+    assert {param.values[0].__module__ for param in property_tests()} == {home.__name__ for home in HOMES}
+    assert len(list(property_tests())) >= 15
+
+
+def test_the_new_element_runs_in_the_program(new_element, tmp_path):
+    """A beam under its own weight: reactions carry it, it sags as Euler and Bernoulli say, mid-nodes made or read."""
+    linear = make_mesh("cantilever", tmp_path / "bar.msh", divisions=(8, 1, 1), hexahedra=True)
+    ends = []
+    for mesh in (linear, quadratic_bricks(tmp_path, body="cantilever", divisions=(8, 1, 1))):
+        data = {
+            "title": "Bar",
+            "mesh": {"file": str(mesh), "element": new_element},
+            "material": {"law": "svk", "young": 1e7, "poisson": 0.3, "density": 1000.0},
+            "constraint": [{"group": "clamp", "fix": ["x", "y", "z"]}],
+            "load": [{"type": "gravity", "acceleration": [0.0, 0.0, -1.0]}],
+            "statics": {"steps": 1},
+            "probe": [{"name": "end", "group": "end", "mean": "area"}],
+        }
+        results = run(case_from_dict(data, tmp_path), tmp_path / f"run of {mesh.stem}")
+        assert results.curve["clamp.rz"][-1] == pytest.approx(10.0, rel=1e-9)
+        assert results.kind == "hexahedron20"
+        ends.append(results.probes["end.uz"][-1])
+    assert ends[0] == pytest.approx(ends[1], rel=1e-9)
     # Euler and Bernoulli: q L^4 / (8 E I); shear adds 1 %, coarse cells and the clamp take some.
-    assert results.probes["end.uz"][-1] == pytest.approx(-10 / (8 * 1e7 * 0.1**4 / 12), rel=0.05)
+    assert ends[0] == pytest.approx(-10 / (8 * 1e7 * 0.1**4 / 12), rel=0.05)
 
 
 def test_a_material_is_a_block(project):

@@ -32,6 +32,10 @@ def cells_of_kind(kind: str) -> Block:
             'found 1 tetra10, expected tetra cells for element 3413; ask for mesh.element = "3-10-1-3"',
         ),
         (["hexahedron"], 'found 1 hexahedron, expected tetra cells .*; ask for mesh.element = "3813"'),
+        (
+            ["hexahedron20"],
+            "found 1 hexahedron20, expected tetra cells .*; mesh with linear bricks: Mesh.Elem",
+        ),
         (["tetra", "hexahedron"], "mixed cells: found 1 hexahedron, 1 tetra, expected only tetra"),
         (["tetra", "tetra10"], "mixed cells: found 1 tetra, 1 tetra10"),
         (["triangle", "vertex"], "found only 1 triangle, 1 vertex, expected tetra .*; mesh the body in 3D"),
@@ -68,14 +72,14 @@ def test_all_negative_cells_are_turned_and_told():
     assert (determinants(turned.points, turned.cells, KINDS["tetra"]) > 0).all()
 
 
-@pytest.mark.parametrize("kind", ["triangle", "quad", "tetra", "hexahedron", "tetra10"])
+@pytest.mark.parametrize("kind", ["triangle", "quad", "tetra", "hexahedron", "tetra10", "hexahedron20"])
 def test_turning_a_cell_changes_the_sign_of_every_determinant(kind):
     row = KINDS[kind]
     unit = np.array(
         [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)], dtype=float
     )
     corners = {"tetra": [0, 1, 3, 4], "tetra10": [0, 1, 3, 4], "triangle": [0, 1, 3]}.get(
-        kind, range(row.nodes)
+        kind, range(row.corners)
     )
     points = unit[list(corners)]
     if row.nodes > row.corners:

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from tiny_meshes import TWO, write_two_bricks
+from tiny_meshes import TWO, quadratic_bricks, write_two_bricks
 
 from ancf_petsc.errors import MeshError
 from ancf_petsc.mesh.groups import cells_of, measure
+from ancf_petsc.mesh.kinds import KINDS
 from ancf_petsc.mesh.read import read_mesh
 
 
@@ -105,6 +106,21 @@ def test_quadratic_tetrahedra_have_their_mid_nodes_in_vtk_order(tmp_path):
     assert np.allclose(mids, corners[:, edges].mean(axis=2), atol=1e-15)
     assert mesh.used.all()
     assert group_table(mesh)["top"] == (9, {2: 2})
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_bricks_of_20_nodes_have_their_mid_nodes_in_vtk_order(version, tmp_path):
+    """As Gmsh makes them of linear ones; a linear element says what to ask Gmsh for."""
+    mesh = read_mesh(quadratic_bricks(tmp_path, version), ("hexahedron20", "hexahedron"))
+    corners, mids = mesh.points[mesh.cells[:, :8]], mesh.points[mesh.cells[:, 8:]]
+    edges = np.array(KINDS["hexahedron"].edges)
+    assert np.allclose(mids, corners[:, edges].mean(axis=2), atol=1e-15)
+    assert mesh.used.all()
+    assert group_table(mesh)["top"] == (8, {2: 1})
+    with pytest.raises(
+        MeshError, match=r"found 2 hexahedron20, expected hexahedron .* Mesh.ElementOrder = 1"
+    ):
+        read_mesh(mesh.source, ("hexahedron",), element="3843")
 
 
 @pytest.mark.parametrize("version", [2.2, 4.1])

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ancf_petsc.mesh.assemble import assemble
+from ancf_petsc.mesh.generate import make_mesh
 from ancf_petsc.mesh.gmsh_session import gmsh_session
 from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.mesh.raw import Block, RawMesh
@@ -94,3 +95,14 @@ def grid(nx: int, ny: int, nz: int, **options) -> Mesh:
     z, y, x = np.meshgrid(*(np.arange(n + 1.0) for n in (nz, ny, nx)), indexing="ij")
     points, cells = bricks(np.stack([x, y, z], axis=-1))
     return tetrahedra(points, cells[:, np.array(KUHN)].reshape(-1, 4), **options)
+
+
+def quadratic_bricks(folder: Path, version: float = 4.1, body: str = "bar", divisions=(1, 1, 2)) -> Path:
+    """A body of bricks with 20 nodes, which Gmsh makes of those with 8."""
+    linear = make_mesh(body, folder / "linear.msh", divisions=divisions, hexahedra=True)
+    path = folder / "quadratic.msh"
+    with gmsh_session(**{"Mesh.SecondOrderIncomplete": 1.0, "Mesh.MshFileVersion": version}) as gmsh:
+        gmsh.merge(str(linear))
+        gmsh.model.mesh.setOrder(2)
+        gmsh.write(str(path))
+    return path

@@ -22,6 +22,8 @@ LARGEST = 1e100
 ASK_FOR = {
     "tetra": 'ask for mesh.element = "3413"',
     "tetra10": 'ask for mesh.element = "3-10-1-3", or mesh with linear tetrahedra',
+    "hexahedron20": "mesh with linear bricks: Mesh.ElementOrder = 1 in Gmsh",
+    "hexahedron27": "mesh with linear bricks: Mesh.ElementOrder = 1 in Gmsh",
     "hexahedron": 'ask for mesh.element = "3813", or mesh with tetrahedra',
 }
 

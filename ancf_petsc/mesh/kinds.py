@@ -72,6 +72,20 @@ _TRIANGLE: dict[str, Any] = {
     "simplices": ((0, 1, 2),),
     "ideal": _REGULAR_TRIANGLE,
 }
+_HEXAHEDRON: dict[str, Any] = {
+    "dimension": 3,
+    "sides": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+    "edges": (
+        *((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)),
+        *((0, 4), (1, 5), (2, 6), (3, 7)),
+    ),
+    "frames": (
+        *((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7)),
+        *((4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3)),
+    ),
+    "simplices": KUHN + _KUHN_MIRRORED,
+    "fold": 2,
+}
 
 KINDS = {
     kind.name: kind
@@ -104,24 +118,7 @@ KINDS = {
             ideal=np.eye(2),
         ),
         Kind("tetra", nodes=4, turned=(0, 2, 1, 3), gmsh=4, **_TETRA),
-        Kind(
-            "hexahedron",
-            3,
-            8,
-            sides=((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
-            edges=(
-                *((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)),
-                *((0, 4), (1, 5), (2, 6), (3, 7)),
-            ),
-            frames=(
-                *((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7)),
-                *((4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3)),
-            ),
-            turned=(0, 3, 2, 1, 4, 7, 6, 5),
-            simplices=KUHN + _KUHN_MIRRORED,
-            fold=2,
-            gmsh=5,
-        ),
+        Kind("hexahedron", nodes=8, turned=(0, 3, 2, 1, 4, 7, 6, 5), gmsh=5, **_HEXAHEDRON),
         Kind("wedge", 3, 6, gmsh=6),
         Kind("pyramid", 3, 5, gmsh=7),
         Kind("line3", 1, 3, linear="line", gmsh=8),
@@ -137,7 +134,15 @@ KINDS = {
             gmsh_order=(0, 1, 2, 3, 4, 5, 6, 7, 9, 8),
             **_TETRA,
         ),
-        Kind("hexahedron20", 3, 20, linear="hexahedron", gmsh=17),
+        Kind(
+            "hexahedron20",
+            nodes=20,
+            linear="hexahedron",
+            turned=(0, 3, 2, 1, 4, 7, 6, 5, 11, 10, 9, 8, 15, 14, 13, 12, 16, 19, 18, 17),
+            gmsh=17,
+            gmsh_order=(*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15),
+            **_HEXAHEDRON,
+        ),
         Kind("hexahedron27", 3, 27, linear="hexahedron", gmsh=12),
         Kind("wedge15", 3, 15, linear="wedge", gmsh=18),
         Kind("wedge18", 3, 18, linear="wedge", gmsh=13),
