@@ -9,6 +9,7 @@ from ancf_petsc.mesh.assemble import assemble
 from ancf_petsc.mesh.gmsh_file import read_gmsh
 from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.mesh.meshio_file import read_meshio
+from ancf_petsc.mesh.msh_text import read_ordinary
 from ancf_petsc.mesh.raw import mesh_error
 
 
@@ -25,7 +26,8 @@ def read_mesh(
     """
     path = Path(path)
     _require_file(path)
-    raw = read_gmsh(path) if path.suffix.lower() == ".msh" and not _is_ansys(path) else read_meshio(path)
+    by_gmsh = path.suffix.lower() == ".msh" and not _is_ansys(path)
+    raw = (read_ordinary(path) or read_gmsh(path)) if by_gmsh else read_meshio(path)
     return assemble(raw, path, kinds, duplicates, element)
 
 

@@ -6,7 +6,6 @@ the stage stand in their place, so every method keeps its order.
 
 from __future__ import annotations
 
-import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -87,8 +86,10 @@ class FirstOrder(Integrator):
 
     def _store(self) -> None:
         """The state from y."""
-        x, v = self.stage(self.y, self.time)
-        self.x.array[:], self.v.array[:] = x.array_r, v.ravel()
+        both = self.y.array_r
+        self.x.array[:], self.v.array[:] = both[: self._own], both[self._own :]
+        if self.equations.moving:
+            self.equations.place(self.x, self.v, self.time)
 
     def _propose(self, asked: float, done: float) -> None:
         """The size of the next step: what PETSc proposes, not less for having been cut short."""
@@ -113,6 +114,6 @@ class FirstOrder(Integrator):
 
     def _report(self, size: float) -> Step:
         counts = (self.ts.getSNESIterations(), self.ts.getKSPIterations(), self.ts.getStepRejections())
-        newton, linear, rejected = np.subtract(counts, self._counts)
+        newton, linear, rejected = (now - then for now, then in zip(counts, self._counts, strict=True))
         self._counts = counts
-        return Step(self.time, size, int(newton), int(linear), int(rejected))
+        return Step(self.time, size, newton, linear, rejected)

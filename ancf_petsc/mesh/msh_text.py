@@ -1,0 +1,198 @@
+"""Text files of Gmsh (.msh 2.2 and 4.1) as Gmsh writes them, read section by section in this process.
+
+A small mesh is read before a process with Gmsh in it has started, a large one several times faster; meshio, which
+reads them too, loses the numbers of nodes and cells and all but one group of a cell. Nothing here judges a file:
+whatever is out of the ordinary (binary numbers, other sections, a count that does not fit, a kind of cell unknown
+here, a node given twice or missing) is left to Gmsh, whose word counts.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ancf_petsc.mesh.kinds import BY_GMSH
+from ancf_petsc.mesh.mesh import Floats, Integers
+from ancf_petsc.mesh.raw import Block, RawMesh
+
+SECTIONS = {"2.2": ("Nodes", "Elements"), "4.1": ("Entities", "Nodes", "Elements")}
+MOST_RUNS = 10_000
+"""Of elements of one kind with equally many tags: more are not worth looking at one by one."""
+
+Names = dict[tuple[int, int], str]
+Rows = dict[tuple[str, tuple[str, ...]], list[Integers]]
+
+
+class NotOrdinary(Exception):
+    """The file holds something that is left to Gmsh."""
+
+
+def read_ordinary(path: Path) -> RawMesh | None:
+    """The mesh in an ordinary text file, else None."""
+    try:
+        version, sections = _sections(path)
+        names = _physical_names(sections.pop("PhysicalNames", ""))
+        read = _read_22 if version == "2.2" else _read_41
+        numbers, points, rows = read(sections, names)
+        return _mesh(numbers, points, rows, names)
+    except (NotOrdinary, ValueError, IndexError):
+        return None
+
+
+def _sections(path: Path) -> tuple[str, dict[str, str]]:
+    """Version, and the text of each section by its name."""
+    data = path.read_bytes()
+    head = re.match(rb"\$MeshFormat\r?\n(2\.2|4\.1) 0 8\r?\n\$EndMeshFormat\s", data)
+    if head is None:
+        raise NotOrdinary
+    version, found, at = head[1].decode(), {}, head.end()
+    start = re.compile(rb"\s*\$(\w+)[ \t]*\r?\n")
+    while (begun := start.match(data, at)) is not None:
+        ending = b"$End" + begun[1]
+        end = data.find(ending, begun.end())
+        if end < 0 or begun[1] in found:
+            raise NotOrdinary
+        found[begun[1].decode()] = data[begun.end() : end].decode("utf-8")
+        at = end + len(ending)
+    wanted = {*SECTIONS[version]}
+    if data[at:].strip() or {*found} - {"PhysicalNames"} != wanted:
+        raise NotOrdinary
+    return version, found
+
+
+def _physical_names(text: str) -> Names:
+    """(dimension, tag) -> name, in the order of the file."""
+    entries = re.findall(r'^(\d) (\d+) "([^"\n]*)"\s*$', text, re.MULTILINE)
+    if text and len(entries) != int(text.split(maxsplit=1)[0]):
+        raise NotOrdinary
+    return {(int(dimension), int(tag)): name for dimension, tag, name in entries}
+
+
+def _numbers(text: str, kind: type) -> np.ndarray:
+    """Every number of a text; the text may hold nothing else."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            return np.fromstring(text, kind, sep=" ")
+        except DeprecationWarning:
+            raise NotOrdinary from None
+
+
+def _group(names: Names, dimension: int, tag: int) -> tuple[str, ...]:
+    if tag < 0:
+        raise NotOrdinary
+    return (names.get((dimension, tag)) or f"physical_{dimension}_{tag}",) if tag else ()
+
+
+# --- version 2.2: every element has its tags, the first is its physical group
+
+
+def _read_22(sections: dict[str, str], names: Names) -> tuple[Integers, Floats, Rows]:
+    table = _numbers(sections["Nodes"], float)
+    if len(table) != 1 + 4 * table[0]:
+        raise NotOrdinary
+    table, rows = table[1:].reshape(-1, 4), defaultdict(list)
+    for number, run in _runs(_numbers(sections["Elements"], np.int64)):
+        kind, tags = BY_GMSH[number], run[:, 3]
+        for tag in np.unique(tags):
+            group = _group(names, kind.dimension, int(tag))
+            own = run if len(tags) == 1 else run[tags == tag]
+            rows[kind.name, group].append(np.delete(own, np.s_[1 : 3 + own[0, 2]], axis=1))
+    return table[:, 0].astype(np.int64), table[:, 1:], rows
+
+
+def _runs(flat: Integers) -> Iterator[tuple[int, Integers]]:
+    """Gmsh's kind and rows (m, 3 + tags + nodes) of elements that follow each other with equally many numbers."""
+    at, count, runs = 1, 0, 0
+    while at < len(flat):
+        number, tags = int(flat[at + 1]), int(flat[at + 2])
+        if number not in BY_GMSH or tags < 1 or runs == MOST_RUNS:
+            raise NotOrdinary
+        width = 3 + tags + BY_GMSH[number].nodes
+        look = 64
+        while True:
+            rows = flat[at : at + min(look, (len(flat) - at) // width) * width].reshape(-1, width)
+            same = (rows[:, 1] == number) & (rows[:, 2] == tags)
+            if not same.all() or len(rows) < look:
+                break
+            look *= 8
+        rows = rows if same.all() else rows[: np.argmin(same)]
+        if not len(rows):
+            raise NotOrdinary
+        yield number, rows
+        at, count, runs = at + rows.size, count + len(rows), runs + 1
+    if count != flat[0]:
+        raise NotOrdinary
+
+
+# --- version 4.1: elements stand by entity, and entities have physical groups
+
+
+def _read_41(sections: dict[str, str], names: Names) -> tuple[Integers, Floats, Rows]:
+    groups = _entity_groups(sections["Entities"], names)
+    numbers, points = _nodes_41(_numbers(sections["Nodes"], float))
+    flat, rows, at, count = _numbers(sections["Elements"], np.int64), defaultdict(list), 4, 0
+    while at < len(flat):
+        dimension, entity, number, size = (int(value) for value in flat[at : at + 4])
+        if number not in BY_GMSH or (dimension, entity) not in groups:
+            raise NotOrdinary
+        width, at = 1 + BY_GMSH[number].nodes, at + 4
+        block = flat[at : at + size * width].reshape(size, width)
+        rows[BY_GMSH[number].name, groups[dimension, entity]].append(block)
+        at, count = at + block.size, count + size
+    if count != flat[1]:
+        raise NotOrdinary
+    return numbers, points, rows
+
+
+def _nodes_41(flat: Floats) -> tuple[Integers, Floats]:
+    numbers, points, at = [np.empty(0)], [np.empty((0, 3))], 4
+    while at < len(flat):
+        _, _, parametric, size = (int(value) for value in flat[at : at + 4])
+        if parametric:
+            raise NotOrdinary
+        at += 4
+        numbers.append(flat[at : at + size])
+        points.append(flat[at + size : at + 4 * size].reshape(size, 3))
+        at += 4 * size
+    found = np.concatenate(numbers).astype(np.int64)
+    if len(found) != flat[1]:
+        raise NotOrdinary
+    return found, np.concatenate(points)
+
+
+def _entity_groups(text: str, names: Names) -> dict[tuple[int, int], tuple[str, ...]]:
+    """(dimension, tag) of every entity -> its groups."""
+    lines = text.splitlines()
+    counts = [int(word) for word in lines[0].split()]
+    if len(lines) != 1 + sum(counts) or len(counts) != 4:
+        raise NotOrdinary
+    found: dict[tuple[int, int], tuple[str, ...]] = {}
+    for dimension, line in zip(np.repeat(np.arange(4), counts), lines[1:], strict=True):
+        words = line.split()
+        first = 4 if dimension == 0 else 7
+        tags = [int(word) for word in words[first + 1 : first + 1 + int(words[first])]]
+        every = [name for tag in tags for name in _group(names, int(dimension), tag)]
+        found[int(dimension), int(words[0])] = tuple(dict.fromkeys(every))
+    return found
+
+
+def _mesh(numbers: Integers, points: Floats, rows: Rows, names: Names) -> RawMesh:
+    """Blocks in meshio's order of nodes, every node of theirs among the numbers."""
+    if len(np.unique(numbers)) < len(numbers) or not np.isfinite(points).all():
+        raise NotOrdinary
+    blocks = []
+    for (kind, groups), parts in rows.items():
+        table = np.concatenate(parts)
+        nodes = table[:, 1:]
+        if not np.isin(nodes, numbers).all():
+            raise NotOrdinary
+        order = next(known.gmsh_order for known in BY_GMSH.values() if known.name == kind)
+        blocks.append(Block(kind, table[:, 0], nodes[:, order] if order else nodes, groups))
+    spoken = [*names.values(), *(name for block in blocks for name in block.names)]
+    return RawMesh(numbers, points, blocks, list(dict.fromkeys(spoken)))
