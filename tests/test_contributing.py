@@ -62,7 +62,7 @@ def property_tests():
                 yield pytest.param(function, id=f"{home.__name__}::{name}")
 
 
-@pytest.mark.parametrize("function", property_tests())
+@pytest.mark.parametrize("function", list(property_tests()))
 def test_all_that_elements_must_do_the_new_one_does(function, new_element, tmp_path):
     """Whatever the tests of the catalogue ask, with every cell, law and quadrature they ask it for."""
     taken = inspect.signature(function).parameters

@@ -36,7 +36,7 @@ def test_64_points_change_the_fall_of_one_brick_by_less_than_a_millimetre(fall):
         assert apart[samples].max() < limit
 
 
-@pytest.mark.parametrize("code", ["3443", "3843", "3-10-1-3"])
+@pytest.mark.parametrize("code", ["3-10-1-3", "3443", "3443+4", "3813", "3843"])
 @pytest.mark.parametrize("law", ["svk", "neo_hooke"])
 def test_energy_and_momenta_of_a_free_body_stay(code, law, tmp_path):
     """Energy-momentum step of elements with slopes and mid-nodes, to Newton's tolerance."""
@@ -53,6 +53,22 @@ def test_energy_and_momenta_of_a_free_body_stay(code, law, tmp_path):
         np.testing.assert_allclose(
             vector, np.broadcast_to(vector[0], vector.shape), atol=1e-9 * np.linalg.norm(vector[0])
         )
+
+
+@pytest.mark.parametrize("code", ["2412", "2432"])
+@pytest.mark.parametrize(("law", "plane"), [("svk", "stress"), ("svk", "strain"), ("neo_hooke", "strain")])
+def test_energy_and_momenta_of_a_free_plane_body_stay(code, law, plane, tmp_path):
+    """The same in the plane z-x."""
+    data = motion(
+        mesh_of("pendulum", code, (3, 1, 1), tmp_path), code, 0.2, integrator="energy_momentum", step=0.01
+    )
+    data |= {"constraint": [], "load": [], "initial": {"velocity": [1.0, 0.0, 2.0], "spin": [0.0, 20.0, 0.0]}}
+    data["material"]["law"], data["section"] = law, SECTION | {"plane": plane}
+    curve = run(case_from_dict(data, tmp_path), tmp_path / "run").curve
+    assert curve["strain_energy"].max() > 0.01 * curve["kinetic_energy"].max()
+    np.testing.assert_allclose(curve["energy_drift"], 0.0, atol=1e-9 * curve["kinetic_energy"][0])
+    for name in ("momentum.x", "momentum.z", "angular_momentum.y"):
+        np.testing.assert_allclose(curve[name], curve[name][0], rtol=1e-9, err_msg=name)
 
 
 def test_momenta_of_a_spinning_brick(tmp_path):

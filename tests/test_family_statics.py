@@ -156,45 +156,6 @@ def test_brick_that_is_no_parallelepiped_is_named(tmp_path):
         run(case_from_dict(data, tmp_path), tmp_path / "run")
 
 
-RUNNER = """
-import sys, json
-from pathlib import Path
-from ancf_petsc import case_from_dict, run
-data = json.loads(Path(sys.argv[1]).read_text())
-run(case_from_dict(data, Path(".")), sys.argv[2])
-"""
-
-
-@pytest.mark.parametrize(
-    ("code", "divisions"), [("3443+4", (6, 1, 1)), ("3843", (6, 1, 1)), ("3-10-1-3", (6, 1, 1))]
-)
-def test_one_two_and_three_ranks_give_the_same_numbers(code, divisions, tmp_path, mpirun):
-    import json
-
-    from ancf_petsc import open_results
-
-    data = cantilever(mesh_of("cantilever", code, divisions, tmp_path), code)
-    data["load"].append({"type": "gravity", "acceleration": [0.0, 0.0, -1.0]})
-    (tmp_path / "case.json").write_text(json.dumps(data))
-    (tmp_path / "runner.py").write_text(RUNNER)
-    runs = []
-    for ranks in (1, 2, 3):
-        mpirun(ranks, [tmp_path / "runner.py", tmp_path / "case.json", tmp_path / f"on{ranks}"])
-        runs.append(open_results(tmp_path / f"on{ranks}"))
-    one = runs[0]
-    # The weight of 10 kg under 1 m/s2 and the load.
-    assert one.curve["clamp.rz"][-1] == pytest.approx(110.0, rel=1e-9)
-    for other in runs[1:]:
-        np.testing.assert_array_equal(other.cells, one.cells)
-        for name in one.curve:
-            if not name.endswith("iterations"):
-                np.testing.assert_allclose(
-                    other.curve[name], one.curve[name], rtol=1e-7, atol=1e-8, err_msg=name
-                )
-        for name in one.node_fields:
-            np.testing.assert_allclose(other.field(name), one.field(name), rtol=0, atol=1e-9, err_msg=name)
-
-
 @pytest.mark.parametrize(
     ("code", "kind"),
     [
