@@ -107,8 +107,10 @@ def test_bending_frequency_of_a_clamped_bar_is_that_of_beam_theory(tmp_path):
     quadratic = first_bending(tmp_path / "quadratic", "3-10-1-3", (20, 2, 2))
     bricks = first_bending(tmp_path / "bricks", "3843", (10, 1, 1))
     assert quadratic == pytest.approx(0.99, abs=0.01)
-    # Both approach the same solid from above, with different cells.
+    # All approach the same solid from above, with different cells.
     assert quadratic == pytest.approx(bricks, rel=5e-3)
+    for code in ("3443", "3443+4"):
+        assert first_bending(tmp_path / code, code, (10, 1, 1)) == pytest.approx(bricks, rel=1e-2), code
 
 
 def test_linear_tetrahedra_are_too_stiff_in_bending_and_soften_with_refinement(tmp_path):

@@ -7,6 +7,7 @@ from family import mesh_of
 from test_kernel_generic import assembled
 
 from ancf_petsc import CaseError, case_from_dict, run
+from ancf_petsc.case.vibration import COLUMNS, find_modes
 from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.kernel import beam, mean_beam
 from ancf_petsc.kernel.graph import block_starts, neighbours
@@ -61,6 +62,19 @@ def test_a_clamp_does_not_keep_the_axis_from_stretching(tmp_path):
     results = run(case_from_dict(data, tmp_path), tmp_path / "run")
     np.testing.assert_allclose(results.field("slopes").reshape(-1, 3, 3)[:2, 0, 0], stretch, rtol=1e-9)
     assert results.probes["end.ux"][-1] == pytest.approx(stretch - 1.0, rel=1e-9)
+
+
+def test_frequencies_of_a_clamped_beam(tmp_path):
+    """Euler and Bernoulli's, roots b of cos b cosh b = -1, raised by cubics of length h by (b h)^4 / 1440 of themselves."""
+    cells = 10
+    data = clamped(cells, tmp_path, 0.0, slopes=["z"])
+    del data["load"], data["statics"]
+    data["dynamics"] = {"duration": 1.0, "step": 0.1}
+    rows = find_modes(case_from_dict(data, tmp_path), tmp_path / "modes", 3, loaded=False, force=False)
+    found = dict(zip(COLUMNS, rows.T, strict=True))["omega"]
+    roots = np.array([1.8751041, 4.6940911, 7.8547574])
+    exact = roots**2 * np.sqrt(YOUNG * INERTIA / (3900.0 * AREA))
+    np.testing.assert_allclose(found / exact - 1.0, (roots / cells) ** 4 / 1440, rtol=0.05, atol=1e-7)
 
 
 def test_without_the_slope_the_end_is_a_hinge(tmp_path):
