@@ -18,6 +18,7 @@ from ancf_petsc.bench.yardstick import gather_scatter
 from ancf_petsc.cli import main
 from ancf_petsc.errors import CaseError
 from ancf_petsc.launcher import environment, on_ranks
+from ancf_petsc.mesh.read import read_mesh
 
 SMALL = "cube:2x2x4"
 PRESSED = {"name": "block", "mesh": SMALL, "stroke": 0.001, "steps": 1}
@@ -103,6 +104,15 @@ def test_a_made_mesh_is_kept():
     first = mesh_path(SMALL)
     made = first.stat().st_mtime_ns
     assert mesh_path(SMALL).stat().st_mtime_ns == made
+
+
+def test_a_graded_mesh_has_a_name_of_its_own():
+    uniform, graded = (
+        read_mesh(mesh_path(name), ("tetra10",))
+        for name in ("cube:0.025:quadratic", "cube:0.025:quadratic:rim=0.005")
+    )
+    assert len(graded.cells) > 2 * len(uniform.cells)
+    assert graded.cells.shape[1] == uniform.cells.shape[1] == 10
 
 
 def test_a_mesh_that_the_project_lacks_is_told():

@@ -162,3 +162,43 @@ def test_files_that_cannot_be_written_are_errors(tmp_path):
         make_mesh("bar", tmp_path / "m.vtu")
     with pytest.raises(CaseError, match="--out: there is no such folder"):
         make_mesh("bar", tmp_path / "none" / "m.msh")
+
+
+def _edges(mesh):
+    """Ends (m, 2, 3) and lengths (m,) of the edges of all tetrahedra, shared ones as often as they are shared."""
+    pairs = np.array([(a, b) for a in range(4) for b in range(a)])
+    ends = mesh.points[mesh.cells[:, pairs].reshape(-1, 2)]
+    return ends, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+
+
+def test_edges_have_the_length_asked_for_at_rims_and_grow_away_from_them(tmp_path):
+    path = make_mesh("cube", tmp_path / "m.msh", size=0.02, rim=0.003)
+    ends, lengths = _edges(read_mesh(path, ("tetra",)))
+    height, outer = np.ptp(ends[..., 2]), np.abs(ends[..., :2]).max()
+    bonded = np.isclose(np.abs(ends[..., 2] - ends[..., 2].min() - height / 2), height / 2)
+    at_rim = (bonded & np.isclose(np.abs(ends[..., :2]).max(axis=-1), outer)).all(axis=1)
+    middle = (np.abs(ends[..., 2] - ends[..., 2].min() - height / 2) < 0.1 * height).all(axis=1)
+    assert 0.7 * 0.003 < np.median(lengths[at_rim]) < 1.3 * 0.003
+    assert np.median(lengths[middle]) > 3 * np.median(lengths[at_rim])
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "words"),
+    [
+        ("cube", {"size": 0.02, "rim": 0.0}, r"--rim: found 0.0, expected a length in metres above 0"),
+        ("cube", {"size": 0.02, "rim": -0.001}, r"--rim: found -0.001, expected a length in metres above 0"),
+        ("cube", {"size": 0.02, "rim": 0.03}, r"--rim: found 0.03, expected .* at most --size 0.02"),
+        ("cube", {"divisions": (1, 1, 1), "rim": 0.001}, r"bricks have divisions.*--rim.*give --size"),
+    ],
+)
+def test_what_cannot_be_graded_is_told(tmp_path, name, options, words):
+    with pytest.raises(CaseError, match=words):
+        make_mesh(name, tmp_path / "m.msh", **options)
+
+
+def test_a_body_without_rims_names_those_that_have_them(tmp_path):
+    name = next(name for name, body in BODIES.items() if not body.rims)
+    with pytest.raises(
+        CaseError, match=rf"{name} has no bonded face: .*--rim.*cube|--rim.*expected one of .*cube"
+    ):
+        make_mesh(name, tmp_path / "m.msh", rim=0.001)

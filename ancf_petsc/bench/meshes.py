@@ -11,13 +11,16 @@ from ancf_petsc.errors import CaseError
 from ancf_petsc.mesh.generate import make_mesh
 
 PROJECT = Path(ancf_petsc.__file__).resolve().parent.parent
-MADE = re.compile(r"(?P<body>[a-z_]+):(?P<how>[0-9.]+|\d+x\d+x\d+)(?P<more>:hexahedra|:quadratic)?")
+MADE = re.compile(
+    r"(?P<body>[a-z_]+):(?P<how>[0-9.]+|\d+x\d+x\d+)(?P<more>:hexahedra|:quadratic)?(:rim=(?P<rim>[0-9.]+))?"
+)
 
 
 def mesh_path(name: str) -> Path:
     """The file of a mesh: "cube_m2" is the project's; "cube:0.0025" (size), "cube:4x4x8" (bricks) are made.
 
-    ":hexahedra" leaves bricks whole, ":quadratic" adds mid-nodes.
+    ":hexahedra" leaves bricks whole, ":quadratic" adds mid-nodes, ":rim=0.001" at the end grades towards
+    rims with edges of that length there.
     """
     made = MADE.fullmatch(name)
     if made is None:
@@ -36,6 +39,7 @@ def _make(made: re.Match[str], place: Path) -> None:
         made["body"],
         draft,
         size=None if bricks else float(made["how"]),
+        rim=None if made["rim"] is None else float(made["rim"]),
         divisions=[int(count) for count in made["how"].split("x")] if bricks else None,
         order=2 if made["more"] == ":quadratic" else 1,
         hexahedra=made["more"] == ":hexahedra",
