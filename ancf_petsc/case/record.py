@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -34,8 +34,8 @@ class Record:
         self._tables: dict[str, Table] = {}
         order, numbering = built.order, assembly.model.numbering
         self._drawn = DrawnPoints(assembly, order)
-        self._own_cells = np.flatnonzero(numbering.own_cells)
-        self._cells = ToSlabs(self.comm, numbering.file_cells[self._own_cells], order.total_cells)
+        own = np.flatnonzero(numbering.own_cells)
+        self._cells = ToSlabs(self.comm, numbering.file_cells[own], order.total_cells, of=own)
         self._store = ResultStore(folder, self.comm, spec.title, spec.units, note=spec.note, version=version)
         self._store.write_mesh(
             order.points, order.kind, order.cells, order.node_numbers, order.cell_numbers, order.groups
@@ -72,20 +72,19 @@ class Record:
         points = {name: self._drawn(rows) for name, rows in nodes.items()}
         if model.element.has_slopes:
             points["slopes"] = self._drawn.slopes(positions)
-        cells = {"green_lagrange": strain, "cauchy": cauchy, "von_mises": von_mises(cauchy), "det_F": det}
+        cells = {"det_F": det, "von_mises": von_mises(cauchy), "cauchy": cauchy, "green_lagrange": strain}
+        del strain, cauchy
         (now,) = time.values()
-        self._store.write_step(
-            now,
-            points,
-            {
-                name: self._cells(
-                    rows[self._own_cells], np.zeros((len(self.built.order.cells), *rows.shape[1:]))
-                )
-                for name, rows in cells.items()
-            },
-        )
+        self._store.write_step(now, points, self._cell_fields(cells))
         self.row = row
         return row
+
+    def _cell_fields(self, cells: dict[str, NDArray]) -> Iterator[tuple[str, NDArray]]:
+        """Fields of this rank's cells on its slab of the file's, one after the other for the sake of memory."""
+        while cells:
+            name, rows = cells.popitem()
+            rows = self._cells(rows, np.zeros((len(self.built.order.cells), *rows.shape[1:])))
+            yield name, rows
 
     def curve(self, x: PETSc.Vec, out_of_balance: NDArray) -> dict[str, float]:
         """Stroke and force of the whole body, empty if the case asks for no curve."""

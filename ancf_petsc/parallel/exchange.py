@@ -119,10 +119,10 @@ class ToSlabs:
     """Carries rows of this rank to the slabs of a global table, by a plan made once.
 
     rows: (k,) global row each local row goes to; every global row is given by at most one rank.
-    total: rows of the global table.
+    total: rows of the global table. of: (k,) the local rows that travel where they are not all.
     """
 
-    def __init__(self, comm: MPI.Comm, rows: NDArray, total: int) -> None:
+    def __init__(self, comm: MPI.Comm, rows: NDArray, total: int, of: NDArray | None = None) -> None:
         self.comm = comm
         self.bounds = slab_bounds(total, comm.size)
         owner = np.searchsorted(self.bounds, rows, side="right") - 1
@@ -132,8 +132,10 @@ class ToSlabs:
         comm.Alltoall(self._sent, self._received)
         targets = _alltoall(comm, rows[self._order].astype(np.int64), self._sent, self._received)
         self._targets = targets - self.bounds[comm.rank]
+        if of is not None:
+            self._order = of[self._order]
 
     def __call__(self, values: NDArray, into: NDArray) -> NDArray:
-        """Put local `values` (k, ...) into the slab `into` (rows of the slab, ...), which is returned."""
+        """Put local `values` (k or more, ...) into the slab `into` (rows of the slab, ...), which is returned."""
         into[self._targets] = _alltoall(self.comm, values[self._order], self._sent, self._received)
         return into

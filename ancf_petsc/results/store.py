@@ -8,7 +8,7 @@ its time and more as attributes. Rows are in the mesh file's order, one contiguo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 Array = NDArray[Any]
-Fields = Mapping[str, Array]
+Fields = Mapping[str, Array] | Iterable[tuple[str, Array]]
 
 
 @dataclass(frozen=True)
@@ -114,23 +114,30 @@ class ResultStore:
     def write_step(
         self, time: float, node_fields: Fields, cell_fields: Fields, extra: Mapping[str, Any] | None = None
     ) -> None:
-        """Fields (slab, ...) by name over nodes and cells; extra: attributes, the same on all ranks."""
+        """Fields (slab, ...) by name over nodes and cells; extra: attributes, the same on all ranks.
+
+        Fields may be pairs that are made one after the other: each is written before the next is asked for.
+        """
         where = f"/steps/{self.steps:05d}"
-        tables = [
-            _field(f"{where}/{link_name(name)}", rows, slab, centre)
+        written: list[Dataset] = []
+        with self._open() as file:
+            with self._agreed():
+                if file:
+                    file.create_group(where).attrs.update({"time": time, **(extra or {})})
             for centre, slab, fields in (
                 ("Node", self._nodes, node_fields),
                 ("Cell", self._cells, cell_fields),
-            )
-            for name, rows in fields.items()
-        ]
-        with self._open() as file:
-            if file:
-                file.create_group(where).attrs.update({"time": time, **(extra or {})})
-                if self.steps == 0:
-                    file["steps"].attrs.update({"node_fields": [*node_fields], "cell_fields": [*cell_fields]})
-            self._write(file, tables)
-        self._xdmf.add_step(float(time), [table.dataset for table in tables])
+            ):
+                for name, rows in fields.items() if isinstance(fields, Mapping) else fields:
+                    table = _field(f"{where}/{link_name(name)}", rows, slab, centre)
+                    self._write(file, [table])
+                    written.append(table.dataset)
+                    del table, rows  # before the next is made
+            with self._agreed():
+                if file and self.steps == 0:
+                    for key, centre in (("node_fields", "Node"), ("cell_fields", "Cell")):
+                        file["steps"].attrs[key] = [each.name for each in written if each.centre == centre]
+        self._xdmf.add_step(float(time), written)
         with self._agreed():
             if self.comm.rank == 0:
                 self._xdmf.write()
