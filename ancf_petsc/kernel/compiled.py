@@ -51,5 +51,5 @@ numba.config.CACHE_DIR = str(CACHE_FOLDER)
 
 
 def kernel(function: Callable) -> Callable:
-    """Compile a pure loop, keep its machine code, divide like IEEE 754 does."""
-    return numba.njit(function, cache=True, error_model="numpy", nogil=True)
+    """Compile a pure loop, keep its machine code, divide like IEEE 754 does; products and sums may be fused."""
+    return numba.njit(function, cache=True, error_model="numpy", nogil=True, fastmath={"contract"})

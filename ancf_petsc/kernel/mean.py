@@ -11,7 +11,7 @@ from functools import cache
 from typing import NamedTuple
 
 from ancf_petsc.kernel.compiled import kernel
-from ancf_petsc.kernel.tet3413 import add_block, edge_sum, scatter_force
+from ancf_petsc.kernel.tet3413 import add_block, edge_sum, nodes_of, scatter_force
 from ancf_petsc.material.models import Law
 from ancf_petsc.material.tensor import add, determinant, scale
 
@@ -35,7 +35,7 @@ def make_mean_kernels(law: Law) -> MeanKernels:
         """Add the forces to result (v, 3). Returns the smallest det F1."""
         smallest = 1e300
         for e in range(first, last):
-            nodes, G = cells[e], gradients[e]
+            nodes, G = nodes_of(cells, e), gradients[e]
             F0, F1 = edge_sum(positions_0, nodes, G), edge_sum(positions_1, nodes, G)
             smallest = min(smallest, determinant(F1))
             scatter_force(result, nodes, stress(F0, F1, parameters), volumes[e], G)
@@ -59,7 +59,7 @@ def make_mean_kernels(law: Law) -> MeanKernels:
     ):
         """Add dforce/dr1, which is not symmetric, to values; starts to driven as in `tet3413`."""
         for e in range(first, last):
-            nodes, G, w = cells[e], gradients[e], volumes[e]
+            nodes, G, w = nodes_of(cells, e), gradients[e], volumes[e]
             F0, F1 = edge_sum(positions_0, nodes, G), edge_sum(positions_1, nodes, G)
             for b in range(1, 4):
                 v = (G[b - 1, 0], G[b - 1, 1], G[b - 1, 2])

@@ -21,7 +21,7 @@ from typing import NamedTuple
 from numba.extending import register_jitable
 
 from ancf_petsc.kernel.compiled import kernel
-from ancf_petsc.kernel.tet3413 import edge_sum, scatter_force
+from ancf_petsc.kernel.tet3413 import edge_sum, nodes_of, scatter_force
 from ancf_petsc.material.models import Law
 
 
@@ -123,7 +123,7 @@ def balance_of(stress: Callable) -> Callable:
         cells, gradients, volumes, parameters = body
         force[:] = 0.0
         for e in range(cells.shape[0]):
-            nodes, G = cells[e], gradients[e]
+            nodes, G = nodes_of(cells, e), gradients[e]
             scatter_force(force, nodes, stress(edge_sum(x, nodes, G), parameters), -volumes[e], G)
         for i in range(force.shape[0]):
             for c in range(3):

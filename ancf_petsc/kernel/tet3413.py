@@ -18,6 +18,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
+import numpy as np
 from numba.extending import register_jitable
 
 from ancf_petsc.kernel.compiled import kernel
@@ -42,6 +43,12 @@ class Kernels(NamedTuple):
     tangent: Callable
     tangent_product: Callable
     fields: Callable
+
+
+@inlined
+def nodes_of(cells, e):
+    """The four nodes of a cell, unsigned: compiled code then need not ask whether an index counts from the end."""
+    return np.uint32(cells[e, 0]), np.uint32(cells[e, 1]), np.uint32(cells[e, 2]), np.uint32(cells[e, 3])
 
 
 @inlined
@@ -162,7 +169,7 @@ def force_kernel(stress: Callable) -> Callable:
         """Add the internal forces Q to force (v, 3). Returns the smallest det F."""
         smallest = 1e300
         for e in range(first, last):
-            nodes, G = cells[e], gradients[e]
+            nodes, G = nodes_of(cells, e), gradients[e]
             F = edge_sum(positions, nodes, G)
             smallest = min(smallest, determinant(F))
             scatter_force(force, nodes, stress(F, parameters), volumes[e], G)
@@ -179,7 +186,7 @@ def energy_kernel(psi: Callable) -> Callable:
         """Strain energy of the cells."""
         total = 0.0
         for e in range(first, last):
-            total += volumes[e] * psi(edge_sum(positions, cells[e], gradients[e]), parameters)
+            total += volumes[e] * psi(edge_sum(positions, nodes_of(cells, e), gradients[e]), parameters)
         return total
 
     return energy
@@ -201,7 +208,7 @@ def tangent_kernel(block_of: Callable) -> Callable:
         another rank owns the nodal vector.
         """
         for e in range(first, last):
-            nodes, G, w = cells[e], gradients[e], volumes[e]
+            nodes, G, w = nodes_of(cells, e), gradients[e], volumes[e]
             F = edge_sum(positions, nodes, G)
             g1 = (G[0, 0], G[0, 1], G[0, 2])
             g2 = (G[1, 0], G[1, 1], G[1, 2])
@@ -233,7 +240,7 @@ def tangent_product_kernel(block_of: Callable) -> Callable:
     def tangent_product(positions, direction, cells, gradients, volumes, parameters, first, last, force):
         """Add the tangent times direction (v, 3) to force (v, 3): the directional derivative of Q."""
         for e in range(first, last):
-            nodes, G = cells[e], gradients[e]
+            nodes, G = nodes_of(cells, e), gradients[e]
             F = edge_sum(positions, nodes, G)
             H = edge_sum(direction, nodes, G)
             dP = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -268,7 +275,7 @@ def fields_kernel(stress: Callable) -> Callable:
     def fields(positions, cells, gradients, volumes, parameters, first, last, strain, cauchy, det):
         """Green-Lagrange strain (e, 9), Cauchy stress (e, 9) and det F (e,) of the cells."""
         for e in range(first, last):
-            F = edge_sum(positions, cells[e], gradients[e])
+            F = edge_sum(positions, nodes_of(cells, e), gradients[e])
             J = determinant(F)
             E = green_lagrange(F)
             sigma = scale(1.0 / J, dot(stress(F, parameters), transpose(F)))

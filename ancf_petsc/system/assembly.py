@@ -180,6 +180,7 @@ class Assembly:
         self._values = np.zeros(9 * len(columns))
         self._diagonal = self._diagonal_places(own_pointers, own_columns)
         matrix = self._share(own_pointers, own_columns, other_pointers, other_columns)
+        matrix.setBlockSize(3)  # petsc4py leaves it out where arrays are shared
         if symmetric:
             matrix.setOption(PETSc.Mat.Option.SYMMETRIC, flag=True)
             matrix.setOption(PETSc.Mat.Option.SYMMETRY_ETERNAL, flag=True)
@@ -265,10 +266,10 @@ class Assembly:
         own = (*_scalar_rows(own_pointers, own_columns), self._values[: self._split])
         sizes = ((n, total), (n, total))
         if self.comm.size == 1:
-            return PETSc.Mat().createAIJWithArrays(sizes, own, bsize=3, comm=self.comm)
+            return PETSc.Mat().createAIJWithArrays(sizes, own, comm=self.comm)
         numbers = self.model.ghost_numbers[other_columns - self.model.owned]
         other = (*_scalar_rows(other_pointers, numbers), self._values[self._split :])
-        return PETSc.Mat().createAIJWithArrays(sizes, (own, other), bsize=3, comm=self.comm)
+        return PETSc.Mat().createAIJWithArrays(sizes, (own, other), comm=self.comm)
 
     def _diagonal_places(self, pointers: NDArray, columns: NDArray) -> NDArray[np.int64]:
         """Where the diagonal of each owned degree of freedom lies in the values."""
