@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ancf_petsc.element.element import Element
+from ancf_petsc.kernel import blocks, coarse
 from ancf_petsc.kernel.choice import way_of
 from ancf_petsc.kernel.compiled import CACHE_FOLDER
 from ancf_petsc.kernel.constant import add_mass, add_mass_blocks, mass_product
@@ -54,6 +55,7 @@ def compile_kernels(
             _compile_motion(way.motion(law), (*tables, p), positions, (pointers, columns))
         _mark(element, law, mean=mean, moving=moving).touch()
     _compile_mass(element, cells, pointers, columns, driven, values)
+    _compile_blocks(pointers, columns, values)
 
 
 def _one_cell(element: Element) -> NDArray[np.float64]:
@@ -74,6 +76,26 @@ def _compile_mass(element: Element, cells, pointers, columns, driven, values) ->
     mass_product(pointers, columns, mass, np.zeros((n, 3)), np.empty((n, 3)))
     none = np.zeros_like(pointers)
     add_mass_blocks(pointers, columns, mass, 1.0, pointers, none, 9 * n * n, driven, values)
+
+
+def _compile_blocks(pointers, columns, values) -> None:
+    n = len(pointers) - 1
+    upper, right = blocks.upper_pattern(pointers, columns)
+    half = (upper, right, np.zeros((len(right), 9)), np.ones((n, 9)))
+    factor, pivots = np.zeros((len(right), 9), np.float32), np.zeros((n, 9), np.float32)
+    blocks.copy_half(values, pointers, *half[::2], half[3])
+    x, lent, work = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3), np.float32)
+    lent.setflags(write=False)  # as PETSc lends its arrays
+    none = np.zeros_like(pointers)
+    for given in (x, lent):
+        blocks.symmetric_product(*half, given, np.empty((n, 3)))
+    blocks.add_ghost_product(values, 0, none, columns, x, np.empty((n, 3)))
+    blocks.factorise(*half, factor, pivots)
+    blocks.solve_factors(upper, right, factor, pivots, lent, work, np.empty((n, 3)))
+    rigid = (np.zeros(n, np.int64), x, np.zeros(n), x)
+    coarse.restrict(*rigid, n, lent, np.zeros(6))
+    coarse.add_motion(*rigid, n, np.zeros(6), np.empty((n, 3)))
+    coarse.add_coarse_matrix(half, (values, 0, none, columns), *rigid, np.zeros((6, 6)))
 
 
 def _compile_motion(kernels: MotionKernels, body: tuple, x: NDArray, graph: tuple[NDArray, NDArray]) -> None:

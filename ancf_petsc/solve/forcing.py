@@ -10,7 +10,7 @@ After Eisenstat and Walker, Choosing the forcing terms in an inexact Newton meth
 from __future__ import annotations
 
 LOOSEST, TIGHTEST = 0.1, 1e-10
-AIM = 0.3
+AIM = 0.5
 SHARE = 0.01
 
 
@@ -31,7 +31,7 @@ class Forcing:
         if self._last is None:
             return
         before, eta = self._last
-        found = max(residual - eta * before, 0.01 * residual) / before**2
+        found = max(residual - eta * before, 0.0) / before**2
         self._curvature = min(max(found, 0.3 * self._curvature, 1.0), 1e6)
 
     def term(self, residual: float) -> float:

@@ -1,11 +1,12 @@
 """Linear solvers for the tangent, chosen by size; the options have the last word.
 
 Up to DIRECT_LIMIT degrees of freedom MUMPS factors the symmetric tangent (LDLᵀ: it may be indefinite, and its
-negative pivots are counted). Above, conjugate gradients: with incomplete factors up to MULTIGRID_LIMIT, then with
-algebraic multigrid that knows the rigid motions of the current configuration. Elements with slopes or mid-nodes
-have long rows, on which incomplete factors do little: up to CURVED_LIMIT they are factored, then multigrid takes
-over. The preconditioner is kept from one tangent to the next while it pays. In motion the mass keeps the matrix
-definite: PETSc's own factorisation, which has less to set up, serves small bodies.
+negative pivots are counted). Above, conjugate gradients with the preconditioner of two levels (`two_level`) up to
+TWO_LEVEL_LIMIT and MOST_RANKS, then with algebraic multigrid that knows the rigid motions of the current
+configuration. Elements with slopes or mid-nodes have long rows, on which incomplete factors do little: up to
+CURVED_LIMIT they are factored, then multigrid takes over. The preconditioner is kept from one tangent to the next while
+it pays. In motion the mass keeps the matrix definite: PETSc's own factorisation, which has less to set up, serves small
+bodies.
 """
 
 from __future__ import annotations
@@ -14,12 +15,13 @@ from math import log10
 
 from petsc4py import PETSc
 
-from ancf_petsc.solve.petsc import default_options, is_given
+from ancf_petsc.solve.petsc import is_given
+from ancf_petsc.solve.two_level import TwoLevel
 from ancf_petsc.system.assembly import Assembly
 from ancf_petsc.system.rigid import rigid_motions
 
 DIRECT_LIMIT = 3_000
-MULTIGRID_LIMIT = 120_000
+TWO_LEVEL_LIMIT, MOST_RANKS = 3_000_000, 64
 SMALL = 3_000
 CURVED_LIMIT = 8_000
 TIRED = 1.5
@@ -41,7 +43,22 @@ class LinearSolver:
         self.direct = self.dof <= (CURVED_LIMIT if self.curved else DIRECT_LIMIT) and not chosen
         self._fresh_rate: float | None = None
         self._rate: float | None = None
+        few = self.dof <= TWO_LEVEL_LIMIT and assembly.comm.size <= MOST_RANKS
+        self._two_level = None
+        if symmetric and few and not (chosen or self.direct or self.curved):
+            self._two_level = TwoLevel(assembly)
         self._configure()
+
+    def operator(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """What conjugate gradients multiply with where the tangent is in `matrix`."""
+        return matrix if self._two_level is None else self._two_level.operator
+
+    def destroy(self) -> None:
+        """Free PETSc's objects; one with Python in it that is left to Python's end can crash it."""
+        if self._two_level is not None:
+            self.ksp.reset()
+            self.ksp.getPC().setType(PETSc.PC.Type.NONE)
+            self._two_level.free()
 
     def _configure(self) -> None:
         pc = self.ksp.getPC()
@@ -56,14 +73,13 @@ class LinearSolver:
         self.ksp.setTolerances(rtol=1e-8, max_it=1000)
         if self.symmetric:
             self.ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
-        if self.curved or self.dof > MULTIGRID_LIMIT or not self.symmetric:
+        if self._two_level is not None:
+            pc.setType(PETSc.PC.Type.PYTHON)
+            pc.setPythonContext(self._two_level)
+        else:
             pc.setType(PETSc.PC.Type.GAMG)
             pc.setGAMGType("agg")
             pc.setGAMGSmooths(1)
-        elif self.assembly.comm.size == 1:
-            pc.setType(PETSc.PC.Type.ICC)
-        else:
-            pc.setType(PETSc.PC.Type.BJACOBI)
 
     def read_options(self) -> None:
         """Let the options speak, and see what they made of the solver."""
@@ -87,15 +103,14 @@ class LinearSolver:
         """Before a solve with a new tangent at x: factor it, or keep the preconditioner if its last solve was about
         as quick as its first.
         """
-        self.ksp.setOperators(matrix)
+        self.ksp.setOperators(self.operator(matrix), matrix)
+        self.take(matrix, x)
         pc = self.ksp.getPC()
         tired = self._fresh_rate is None or self._rate is None or self._rate > TIRED * self._fresh_rate
         pc.setReusePreconditioner(not (tired or self.direct))
         if tired or self.direct:
             self._fresh_rate = None
-            self.know_rigid_motions(matrix, x)
-            with default_options({"sub_pc_type": "icc"}):
-                self.ksp.setUp()
+            self.ksp.setUp()
             pc.setReusePreconditioner(True)
 
     def note_effort(self, iterations: int, reduction: float) -> None:
@@ -110,13 +125,19 @@ class LinearSolver:
         """The solver in words, as it is after the options were read."""
         pc = self.ksp.getPC()
         package = pc.getFactorSolverType() if pc.getType() in ("cholesky", "lu") else None
-        names = [self.ksp.getType(), pc.getType()] + ([package] if package else [])
+        kind = "two levels" if pc.getType() == "python" else pc.getType()
+        names = [self.ksp.getType(), kind] + ([package] if package else [])
         return f"{' + '.join(names)}, {self.dof} degrees of freedom"
 
-    def know_rigid_motions(self, matrix: PETSc.Mat, x: PETSc.Vec) -> None:
+    def take(self, matrix: PETSc.Mat, x: PETSc.Vec) -> None:
+        """See a tangent filled at x. Collective."""
+        if self._two_level is not None and not self.direct:
+            self._two_level.take(x)
+        if self.ksp.getPC().getType() in ("gamg", "hypre", "ml", "bddc"):
+            self._tell_rigid_motions(matrix, x)
+
+    def _tell_rigid_motions(self, matrix: PETSc.Mat, x: PETSc.Vec) -> None:
         """Give multigrid the rigid motions of the state x."""
-        if self.ksp.getPC().getType() not in ("gamg", "hypre", "ml", "bddc"):
-            return
         vectors = []
         for mode in rigid_motions(self.assembly.model, x.array_r.reshape(-1, 3)):
             vectors.append(self.assembly.vector())

@@ -18,7 +18,7 @@ from ancf_petsc.solve.petsc import default_options
 from ancf_petsc.system.assembly import Assembly
 
 MOST_ITERATIONS = 25
-PREDICTOR_TERM = 1e-3
+PREDICTOR_TERM = 1e-8  # the path's slope is made of it, and extrapolated from
 Reason = PETSc.SNES.ConvergedReason
 WORDS = {
     Reason.DIVERGED_FNORM_NAN: "the start has det F <= 0 or forces that are not finite",
@@ -30,7 +30,7 @@ WORDS = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one Newton solve did. residuals: out-of-balance force over the force scale, one an iteration."""
+    """What one Newton solve did, with its predictor. residuals: out-of-balance force over the force scale, one an iteration."""
 
     converged: bool
     reason: str
@@ -52,10 +52,12 @@ class Newton:
         self._supported = (0.0, 0.0)
         self._snes = self._create()
         self.linear = LinearSolver(assembly, self._snes.getKSP())
+        self._snes.setJacobian(self._tangent, self.linear.operator(self.matrix), self.matrix)
         # Preconditioners are renewed by hand, after each tangent: SNES itself does it the first time only.
         with default_options({"snes_lag_preconditioner": -2}):
             self._snes.setFromOptions()
         self.linear.read_options()
+        self._predicting = 0
         self._forcing = Forcing(tolerance)
         self._term = PREDICTOR_TERM
 
@@ -63,21 +65,20 @@ class Newton:
         snes = PETSc.SNES().create(self.comm)
         snes.setType(PETSc.SNES.Type.NEWTONLS)
         snes.setFunction(self._residual, self.assembly.vector())
-        snes.setJacobian(self._tangent, self.matrix)
         snes.setConvergenceTest(self._test)
         snes.setTolerances(max_it=MOST_ITERATIONS)
         return snes
 
     def destroy(self) -> None:
         """Free PETSc's objects."""
+        self.linear.destroy()
         self._snes.destroy()
         self.matrix.destroy()
 
     def prepare(self) -> None:
         """Set the linear solver up on the undeformed body, so that every option has been asked for."""
         x = self.assembly.reference_vector()
-        self._tangent(self._snes, x, self.matrix, self.matrix)
-        self.linear.ksp.setOperators(self.matrix)
+        self._tangent(self._snes, x, self.linear.operator(self.matrix), self.matrix)
         self._snes.setUp()
         self.linear.ksp.setUp()
         x.destroy()
@@ -93,11 +94,12 @@ class Newton:
         self._forcing.start()
         self._snes.solve(None, x)
         reason = self._snes.getConvergedReason()
+        before, self._predicting = self._predicting, 0
         return Outcome(
             converged=reason > 0,
             reason=WORDS.get(reason, f"PETSc's reason {reason}"),
             newton=self._snes.getIterationNumber(),
-            linear=self._snes.getLinearSolveIterations(),
+            linear=before + self._snes.getLinearSolveIterations(),
             residuals=tuple(self._residuals),
         )
 
@@ -114,12 +116,12 @@ class Newton:
         rhs.array[:] = (load - assembly.tangent_product(x, increment)).ravel()
         rhs.array[assembly.driven] = 0.0
         self._term = PREDICTOR_TERM
-        self._tangent(self._snes, x, self.matrix, self.matrix)
+        self._tangent(self._snes, x, self.linear.operator(self.matrix), self.matrix)
         ksp = self.linear.ksp
-        ksp.setOperators(self.matrix)
         step = assembly.vector()
         ksp.solve(rhs, step)
         good = ksp.getConvergedReason() > 0
+        self._predicting += ksp.getIterationNumber()
         self.linear.note_effort(ksp.getIterationNumber(), self._term)
         x.axpy(1.0, step)
         x.axpy(1.0, increment)

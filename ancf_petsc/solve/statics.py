@@ -1,6 +1,6 @@
 """Quasi-static load paths: equilibrium after equilibrium in pseudo-time s from 0 to exactly 1.
 
-Predictor: the tangent for the first steps and after corners of a ramp, then extrapolation of the last states. A step
+Predictor: the tangent for the first step and after corners of a ramp, then extrapolation of the last states. A step
 that fails is halved, one that converges quickly lets the next grow; outputs and corners are hit exactly.
 """
 
@@ -9,17 +9,17 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, isclose
 
 from petsc4py import PETSc
 
 from ancf_petsc.errors import Interrupted, NoEquilibrium
+from ancf_petsc.solve.extrapolation import Extrapolation
 from ancf_petsc.solve.newton import Newton, Outcome
 from ancf_petsc.solve.stability import why_it_ends
 
 LONGEST_FIRST_STEP = 0.1
 QUICK, SLOW = 5, 9
-MOST_STATES = 4
 log = logging.getLogger("ancf")
 
 
@@ -58,7 +58,8 @@ class LoadPath:
         self.interrupted = interrupted
         self.s = 0.0
         self.x = self.assembly.reference_vector()
-        self._history: list[tuple[float, PETSc.Vec]] = [(0.0, self.x.copy())]
+        self._past = Extrapolation()
+        self._past.add(0.0, self.x)
         self._step = min(self.marks[0], LONGEST_FIRST_STEP)
 
     def run(self) -> None:
@@ -104,6 +105,7 @@ class LoadPath:
             trial.destroy()
         trial = self.x.copy()
         self.newton.predict(trial, self.s, target)
+        self._note_slope(trial, target)
         outcome = self.newton.solve(target, trial)
         if not outcome.converged and self.newton.linear.gave_up():
             log.info("  the tangent is not positive definite: factoring from now on")
@@ -112,35 +114,40 @@ class LoadPath:
         return trial, outcome
 
     def _extrapolated(self, target: float) -> PETSc.Vec | None:
-        """The polynomial through the last states, three at least; None where it turns cells inside out."""
-        if len(self._history) < 3:
+        """The polynomial through the last states; None where it turns cells inside out."""
+        trial = self._past.at(target)
+        if trial is None:
             return None
-        trial = self.x.copy()
-        trial.zeroEntries()
-        times = [s for s, _ in self._history]
-        for i, (s, state) in enumerate(self._history):
-            factor = 1.0
-            for j, other in enumerate(times):
-                if j != i:
-                    factor *= (target - other) / (s - other)
-            trial.axpy(factor, state)
         self.assembly.set_driven(trial, target)
         if self.assembly.smallest_det(trial) > 0.0:
             return trial
         trial.destroy()
         return None
 
+    def _note_slope(self, predicted: PETSc.Vec, target: float) -> None:
+        """The slope of the path where it begins: the tangent's where ramps are straight, none where they start flat."""
+        if not self._past.wants_slope:
+            return
+        size = target - self.s
+        model = self.assembly.model
+        ramps = [motion.ramp for motion in model.motions] + [load.ramp for load in model.loads]
+        rises = [(ramp.rate(self.s) * size, ramp.value(target) - ramp.value(self.s)) for ramp in ramps]
+        straight = all(isclose(rate, rise, rel_tol=1e-9, abs_tol=1e-12) for rate, rise in rises)
+        if not straight and any(rate for rate, _ in rises):
+            return
+        slope = predicted.copy()
+        slope.axpy(-1.0, self.x)
+        slope.scale(1.0 / size if straight else 0.0)
+        self._past.set_slope(slope)
+        slope.destroy()
+
     def _accept(self, s: float, x: PETSc.Vec) -> None:
         """Make x at s the present state and remember it."""
         self.x.destroy()
         self.s, self.x = s, x
         if s in self.corners:
-            for _, state in self._history:
-                state.destroy()
-            self._history = []
-        self._history.append((s, x.copy()))
-        if len(self._history) > MOST_STATES:
-            self._history.pop(0)[1].destroy()
+            self._past.forget()
+        self._past.add(s, x)
 
     def _adapt(self, step: Step) -> None:
         """The size of the next step from how hard this one was."""

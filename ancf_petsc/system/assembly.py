@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -17,6 +18,19 @@ from petsc4py import PETSc
 from ancf_petsc.kernel.constant import add_mass_blocks
 from ancf_petsc.kernel.graph import block_starts, neighbours
 from ancf_petsc.system.model import Model
+
+
+class Rows(NamedTuple):
+    """Where the matrix's values lie: by scalar rows, own columns first, from `split` on those of ghosts.
+
+    pointers (n + 1,) and columns of 3 x 3 blocks in the rows of the n owned nodal vectors; columns are local.
+    """
+
+    own_pointers: NDArray[np.int64]
+    own_columns: NDArray[np.int32]
+    other_pointers: NDArray[np.int64]
+    other_columns: NDArray[np.int32]
+    split: int
 
 
 class Assembly:
@@ -169,17 +183,14 @@ class Assembly:
         for inside in (own, ~own):
             counts = np.bincount(rows[inside], minlength=n)
             parts.append((np.concatenate(([0], np.cumsum(counts))), columns[inside]))
-        (own_pointers, own_columns), (other_pointers, other_columns) = parts
-        self._starts = block_starts(
-            self.model.cells, n, own_pointers, own_columns, other_pointers, other_columns, 3
-        )
+        self.rows = Rows(*parts[0], *parts[1], split=9 * int(own.sum()))
+        own_counts, other_counts = np.diff(self.rows.own_pointers), np.diff(self.rows.other_pointers)
+        self._starts = block_starts(self.model.cells, n, *self.rows[:4], 3)
         self._strides = np.zeros((len(self.model.reference), 2), np.int32)
-        self._strides[:n, 0], self._strides[:n, 1] = 3 * np.diff(own_pointers), 3 * np.diff(other_pointers)
-        self._pointers = (own_pointers, other_pointers)
-        self._split = 9 * len(own_columns)
-        self._values = np.zeros(9 * len(columns))
-        self._diagonal = self._diagonal_places(own_pointers, own_columns)
-        matrix = self._share(own_pointers, own_columns, other_pointers, other_columns)
+        self._strides[:n, 0], self._strides[:n, 1] = 3 * own_counts, 3 * other_counts
+        self.values = np.zeros(9 * len(columns))
+        self._diagonal = self._diagonal_places()
+        matrix = self._share()
         matrix.setBlockSize(3)  # petsc4py leaves it out where arrays are shared
         if symmetric:
             matrix.setOption(PETSc.Mat.Option.SYMMETRIC, flag=True)
@@ -188,7 +199,7 @@ class Assembly:
 
     def tangent(self, x: PETSc.Vec, matrix: PETSc.Mat, add: Callable[[], None] | None = None) -> None:
         """Fill the matrix with the tangent at x, and what `add` adds to it (`add_mass`)."""
-        positions, values = self.local(x), self._values
+        positions, values = self.local(x), self.values
         values[:] = 0.0
         for region in self.model.regions:
             region.kernels.tangent(
@@ -199,7 +210,7 @@ class Assembly:
                 region.last,
                 self._starts,
                 self._strides,
-                self._split,
+                self.rows.split,
                 self._driven_bits,
                 values,
             )
@@ -212,7 +223,7 @@ class Assembly:
     ) -> None:
         """Fill the matrix with the derivative of `mean_force` with respect to x1, and what `add` adds to it."""
         before, after = self._two_states(x0, x1)
-        self._values[:] = 0.0
+        self.values[:] = 0.0
         for region in self.model.regions:
             assert region.mean_kernels is not None
             region.mean_kernels.tangent(
@@ -224,9 +235,9 @@ class Assembly:
                 region.last,
                 self._starts,
                 self._strides,
-                self._split,
+                self.rows.split,
                 self._driven_bits,
-                self._values,
+                self.values,
             )
         if add is not None:
             add()
@@ -235,19 +246,26 @@ class Assembly:
     def add_mass(self, mass: NDArray, factor: float) -> None:
         """Add factor times a mass, one number per entry of the graph, to the matrix that is being filled."""
         add_mass_blocks(
-            *self.graph, mass, factor, *self._pointers, self._split, self._driven_bits, self._values
+            *self.graph,
+            mass,
+            factor,
+            self.rows.own_pointers,
+            self.rows.other_pointers,
+            self.rows.split,
+            self._driven_bits,
+            self.values,
         )
 
     def fill_mass(self, matrix: PETSc.Mat, mass: NDArray) -> None:
         """Fill the matrix with a mass; driven degrees of freedom get none."""
-        self._values[:] = 0.0
+        self.values[:] = 0.0
         self.add_mass(mass, 1.0)
         matrix.stateIncrease()
         matrix.assemble()
 
     def _finish(self, matrix: PETSc.Mat) -> None:
         """One number on the diagonal of all driven degrees of freedom: the mean of the others."""
-        values = self._values
+        values = self.values
         diagonal = values[self._diagonal]
         free = np.ones(len(diagonal), bool)
         free[self.driven] = False
@@ -260,26 +278,28 @@ class Assembly:
         matrix.stateIncrease()
         matrix.assemble()
 
-    def _share(self, own_pointers, own_columns, other_pointers, other_columns) -> PETSc.Mat:
+    def _share(self) -> PETSc.Mat:
         """PETSc's matrix on this object's array of values."""
-        n, total = 3 * self.model.owned, self.comm.allreduce(3 * self.model.owned)
-        own = (*_scalar_rows(own_pointers, own_columns), self._values[: self._split])
+        rows, n, total = self.rows, 3 * self.model.owned, self.comm.allreduce(3 * self.model.owned)
+        own = (*_scalar_rows(rows.own_pointers, rows.own_columns), self.values[: rows.split])
         sizes = ((n, total), (n, total))
         if self.comm.size == 1:
             return PETSc.Mat().createAIJWithArrays(sizes, own, comm=self.comm)
-        numbers = self.model.ghost_numbers[other_columns - self.model.owned]
-        other = (*_scalar_rows(other_pointers, numbers), self._values[self._split :])
+        numbers = self.model.ghost_numbers[rows.other_columns - self.model.owned]
+        other = (*_scalar_rows(rows.other_pointers, numbers), self.values[rows.split :])
         return PETSc.Mat().createAIJWithArrays(sizes, (own, other), comm=self.comm)
 
-    def _diagonal_places(self, pointers: NDArray, columns: NDArray) -> NDArray[np.int64]:
+    def _diagonal_places(self) -> NDArray[np.int64]:
         """Where the diagonal of each owned degree of freedom lies in the values."""
+        pointers, columns = self.rows.own_pointers, self.rows.own_columns
         n = self.model.owned
         counts = np.diff(pointers)
         rows = np.repeat(np.arange(n), counts)
         slot = np.flatnonzero(columns == rows) - pointers[:-1]
         component = np.arange(3)
         start = 9 * pointers[:-1] + 3 * slot
-        return (start[:, None] + component * (3 * counts[:, None] + 1)).ravel()
+        places: NDArray[np.int64] = (start[:, None] + component * (3 * counts[:, None] + 1)).ravel()
+        return places
 
     def _ghost_scatter(self):
         """PETSc's scatter to the ghosts, the vector it fills and one to fill it from; None on one rank."""

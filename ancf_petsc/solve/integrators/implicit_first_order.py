@@ -63,7 +63,7 @@ class ImplicitFirstOrder(FirstOrder):
 
     def set_solver_up(self) -> None:
         self._fill(self.y, 0.0, 1.0 / self.ts.getTimeStep())
-        self._eliminated.ksp.setOperators(self.matrix)
+        self._eliminated.set_operators()
         self._eliminated.ksp.setUp()
         self.ts.setUp()
         self.test.aged = True
@@ -73,7 +73,7 @@ class ImplicitFirstOrder(FirstOrder):
 
     def destroy(self) -> None:
         super().destroy()
-        for item in (self.jacobian, self._eliminated.ksp, self.matrix):
+        for item in (self._eliminated.linear, self.jacobian, self._eliminated.ksp, self.matrix):
             item.destroy()
 
     def _function(self, ts: PETSc.TS, t: float, y: PETSc.Vec, rate: PETSc.Vec, f: PETSc.Vec) -> None:
@@ -103,7 +103,7 @@ class ImplicitFirstOrder(FirstOrder):
         self._eliminated.shift = shift
         factor, mass = shift * (shift + self.equations.damping), self.equations.mass
         self.equations.assembly.tangent(x, self.matrix, lambda: mass.add_to_matrix(factor))
-        self._eliminated.linear.know_rigid_motions(self.matrix, x)
+        self._eliminated.linear.take(self.matrix, x)
         self.test.aged = False
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
@@ -128,6 +128,9 @@ class _Eliminated:
         self.ksp.setFromOptions()
         self._right, self._answer = assembly.vector(), assembly.vector()
 
+    def set_operators(self) -> None:
+        self.ksp.setOperators(self.linear.operator(self.owner.matrix), self.owner.matrix)
+
     def mult(self, A: PETSc.Mat, y: PETSc.Vec, f: PETSc.Vec) -> None:
         """The product, for Krylov methods an option may ask for."""
         n, dy = self.owner._own, y.array_r
@@ -144,7 +147,7 @@ class _Eliminated:
         r[equations.assembly.driven] = 0.0
         right = s + (self.shift + equations.damping) * self._mass(r)
         self._right.array[:] = self._free(right)
-        self.ksp.setOperators(self.owner.matrix)
+        self.set_operators()
         self.ksp.solve(self._right, self._answer)
         dx = self._answer.array_r
         y.array[:n], y.array[n:] = dx, self.shift * dx - r

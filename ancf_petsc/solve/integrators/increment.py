@@ -110,6 +110,8 @@ class IncrementSolver:
             self._quick.setFromOptions()
         self._careful = self._create("bt")
         self._careful.setKSP(self._quick.getKSP())
+        for snes in (self._quick, self._careful):
+            snes.setJacobian(self._jacobian, self.linear.operator(self.matrix), self.matrix)
         with default_options({"snes_linesearch_type": "bt"}):
             self._careful.setFromOptions()
 
@@ -117,7 +119,6 @@ class IncrementSolver:
         snes = PETSc.SNES().create(self.equations.comm)
         snes.setType(PETSc.SNES.Type.NEWTONLS)
         snes.setFunction(self._function, self._residual)
-        snes.setJacobian(self._jacobian, self.matrix)
         snes.setConvergenceTest(self.test)
         snes.setTolerances(rtol=self.relative, atol=0.0, max_it=MOST_ITERATIONS)
         return snes
@@ -140,14 +141,14 @@ class IncrementSolver:
 
     def set_up(self) -> None:
         """Fill the matrix at d and set the linear solver up."""
-        self._jacobian(self._quick, self.d, self.matrix, self.matrix)
-        self.linear.ksp.setOperators(self.matrix)
+        self._jacobian(self._quick, self.d, self.linear.operator(self.matrix), self.matrix)
+        self.linear.ksp.setOperators(self.linear.operator(self.matrix), self.matrix)
         self._quick.setUp()
         self.linear.ksp.setUp()
 
     def destroy(self) -> None:
         """Free PETSc's objects."""
-        for item in (self._careful, self._quick, self.matrix, self.d, self._residual):
+        for item in (self.linear, self._careful, self._quick, self.matrix, self.d, self._residual):
             item.destroy()
 
     def _run(self, snes: PETSc.SNES) -> int:
@@ -166,5 +167,5 @@ class IncrementSolver:
     def _jacobian(self, snes: PETSc.SNES, d: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
         if self.test.aged or self._always_new:
             self.tangent(d, P)
-            self.linear.know_rigid_motions(P, self.x)
+            self.linear.take(P, self.x)
             self.test.aged = False
