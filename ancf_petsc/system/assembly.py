@@ -289,7 +289,7 @@ class Assembly:
         other = (*_scalar_rows(rows.other_pointers, numbers), self.values[rows.split :])
         return PETSc.Mat().createAIJWithArrays(sizes, (own, other), comm=self.comm)
 
-    def _diagonal_places(self) -> NDArray[np.int64]:
+    def _diagonal_places(self) -> NDArray:
         """Where the diagonal of each owned degree of freedom lies in the values."""
         pointers, columns = self.rows.own_pointers, self.rows.own_columns
         n = self.model.owned
@@ -298,8 +298,7 @@ class Assembly:
         slot = np.flatnonzero(columns == rows) - pointers[:-1]
         component = np.arange(3)
         start = 9 * pointers[:-1] + 3 * slot
-        places: NDArray[np.int64] = (start[:, None] + component * (3 * counts[:, None] + 1)).ravel()
-        return places
+        return (start[:, None] + component * (3 * counts[:, None] + 1)).ravel()
 
     def _ghost_scatter(self):
         """PETSc's scatter to the ghosts, the vector it fills and one to fill it from; None on one rank."""
