@@ -34,7 +34,7 @@ numbers = model.numbering.file_nodes[: model.owned, None] * 3.0 + np.arange(3)
 x.array[:] += 1e-4 * np.sin(7 * numbers).ravel()
 rhs.array[:] = np.cos(3 * numbers).ravel()
 rhs.array[assembly.driven] = 0.0
-newton._tangent(newton._snes, x, newton.linear.operator(newton.matrix), newton.matrix)
+newton.tangent_at(x)
 newton.linear.operator(newton.matrix).mult(rhs, found)
 newton.matrix.mult(rhs, other)
 other.axpy(-1.0, found)

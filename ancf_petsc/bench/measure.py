@@ -22,6 +22,7 @@ from ancf_petsc.bench.kernels import residual, tangent
 from ancf_petsc.bench.meshes import mesh_path
 from ancf_petsc.bench.messages import exchange_cost, messages
 from ancf_petsc.bench.problems import PROBLEMS, block, block_force_234, reference_tip
+from ancf_petsc.bench.solvers import iterations
 from ancf_petsc.bench.yardstick import copy_rate, gather_time
 from ancf_petsc.case.blueprint import draw_on
 from ancf_petsc.case.build import build, build_from
@@ -223,6 +224,7 @@ MEASUREMENTS: dict[str, Callable[..., Result]] = {
     "run": run,
     "explicit": explicit,
     "stroke": stroke,
+    "iterations": iterations,
     "messages": messages,
     "exchange_cost": exchange_cost,
 }

@@ -58,6 +58,19 @@ def pendulum(mesh: str, duration: float, outputs: int, **dynamics: Any) -> dict[
     }
 
 
+def beam(mesh: str, element: str) -> dict[str, Any]:
+    """A beam along x, clamped at x = 0, with a force across its end."""
+    return {
+        "title": f"beam {mesh}",
+        "mesh": {"file": str(mesh_path(mesh)), "element": element},
+        "groups": {"clamp": {"plane": "x", "at": "min"}, "end": {"plane": "x", "at": "max"}},
+        "material": {"law": "svk", "young": 2e6, "poisson": 0.3},
+        "constraint": [{"group": "clamp", "fix": ["x", "y", "z"]}],
+        "load": [{"type": "force", "group": "end", "total": [0.0, 0.0, -60.0]}],
+        "statics": {"steps": 1},
+    }
+
+
 PROBLEMS = {"block": block, "pendulum": pendulum}
 
 

@@ -1,11 +1,11 @@
 """Linear solvers for the tangent, chosen by size; the options have the last word.
 
-Up to DIRECT_LIMIT degrees of freedom MUMPS factors the symmetric tangent (LDLᵀ: it may be indefinite, and its
-negative pivots are counted). Above, conjugate gradients with the preconditioner of two levels (`two_level`) up to
-TWO_LEVEL_LIMIT and MOST_RANKS, then with algebraic multigrid that knows the rigid motions of the current
-configuration. Elements with slopes or mid-nodes have long rows, on which incomplete factors do little: up to
-CURVED_LIMIT they are factored, then multigrid takes over. The preconditioner is kept from one tangent to the next while
-it pays. In motion the mass keeps the matrix definite: PETSc's own factorisation, which has less to set up, serves small
+Up to DIRECT_LIMIT degrees of freedom MUMPS factors the symmetric tangent, up to CURVED_LIMIT where elements have
+slopes or mid-nodes, whose rows are long. Above, conjugate gradients with the preconditioner of two levels
+(`two_level`); beyond TWO_LEVEL_LIMIT or MOST_RANKS, and for tangents that are not symmetric, algebraic multigrid that
+knows the rigid motions of the current configuration. Where conjugate gradients meet a tangent that is not positive
+definite, MUMPS factors from there on (LDLᵀ). The preconditioner is kept from one tangent to the next while it pays.
+In motion the mass keeps the matrix definite: PETSc's own factorisation, which has less to set up, serves small
 bodies.
 """
 
@@ -20,10 +20,9 @@ from ancf_petsc.solve.two_level import TwoLevel
 from ancf_petsc.system.assembly import Assembly
 from ancf_petsc.system.rigid import rigid_motions
 
-DIRECT_LIMIT = 3_000
+DIRECT_LIMIT, CURVED_LIMIT = 300, 5_000
 TWO_LEVEL_LIMIT, MOST_RANKS = 3_000_000, 64
 SMALL = 3_000
-CURVED_LIMIT = 8_000
 TIRED = 1.5
 
 
@@ -39,13 +38,13 @@ class LinearSolver:
         self.symmetric = symmetric
         self.small = moving and assembly.comm.size == 1 and self.dof <= SMALL
         chosen = is_given("ksp_type") or is_given("pc_type")
-        self.curved = assembly.model.element.is_curved
-        self.direct = self.dof <= (CURVED_LIMIT if self.curved else DIRECT_LIMIT) and not chosen
+        limit = CURVED_LIMIT if assembly.model.element.is_curved else SMALL if moving else DIRECT_LIMIT
+        self.direct = self.dof <= limit and not chosen
         self._fresh_rate: float | None = None
         self._rate: float | None = None
         few = self.dof <= TWO_LEVEL_LIMIT and assembly.comm.size <= MOST_RANKS
         self._two_level = None
-        if symmetric and few and not (chosen or self.direct or self.curved):
+        if symmetric and few and not (chosen or self.direct):
             self._two_level = TwoLevel(assembly)
         self._configure()
 

@@ -78,7 +78,7 @@ class Newton:
     def prepare(self) -> None:
         """Set the linear solver up on the undeformed body, so that every option has been asked for."""
         x = self.assembly.reference_vector()
-        self._tangent(self._snes, x, self.linear.operator(self.matrix), self.matrix)
+        self.tangent_at(x)
         self._snes.setUp()
         self.linear.ksp.setUp()
         x.destroy()
@@ -116,7 +116,7 @@ class Newton:
         rhs.array[:] = (load - assembly.tangent_product(x, increment)).ravel()
         rhs.array[assembly.driven] = 0.0
         self._term = PREDICTOR_TERM
-        self._tangent(self._snes, x, self.linear.operator(self.matrix), self.matrix)
+        self.tangent_at(x)
         ksp = self.linear.ksp
         step = assembly.vector()
         ksp.solve(rhs, step)
@@ -129,6 +129,10 @@ class Newton:
         for vector in (increment, rhs, step):
             vector.destroy()
         return good
+
+    def tangent_at(self, x: PETSc.Vec) -> None:
+        """Make the linear solver ready for the tangent at x. Collective."""
+        self._tangent(self._snes, x, self.linear.operator(self.matrix), self.matrix)
 
     def out_of_balance(self, x: PETSc.Vec):
         """Q - Q_e (n, 3) on owned nodal vectors at the present pseudo-time: reactions where driven."""
