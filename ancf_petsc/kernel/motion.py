@@ -5,11 +5,11 @@ For a body of one material on one rank, whose driven degrees of freedom rest: wh
 arithmetic, not the interpreter's. Arrays as in `tet3413`, with n nodal vectors:
     x, v, a (n, 3)        positions, velocities, accelerations
     factors (m, l)        of the loads at m times, patterns (l, n, 3) of the loads
-    inverse (k, n, n)     inverses of the consistent mass of free nodes, zero elsewhere; none with lumped mass
-    which (3,)            the inverse that serves each component
+    starts (n+1,), factors (k, size), which (3,)  of the consistent mass (`envelope`): component c is solved
+                          for by factor which[c]; no factors with lumped mass
     share (n, 3)          1 / mass of free components, 0 of driven ones: the inverse of a lumped mass
     pointers, columns, values  the mass, one number for a pair of nodes
-    force (n, 3), sums (3, n)  overwritten
+    force (n, 3), work (3, n)  overwritten
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from typing import NamedTuple
 from numba.extending import register_jitable
 
 from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.kernel.envelope import solve_components
 from ancf_petsc.kernel.tet3413 import edge_sum, nodes_of, scatter_force
 from ancf_petsc.material.models import Law
 
@@ -34,24 +35,15 @@ class MotionKernels(NamedTuple):
 
 
 @register_jitable
-def solve_mass(inverse, which, share, force, sums, a):
+def solve_mass(mass, force, work, a):
     """Accelerations (n, 3) of forces (n, 3)."""
-    n = force.shape[0]
-    if inverse.shape[0] == 0:
-        for i in range(n):
-            for c in range(3):
-                a[i, c] = share[i, c] * force[i, c]
+    starts, factors, which, share = mass
+    if factors.shape[0]:
+        solve_components(starts, factors, which, force, work, a)
         return
-    for c in range(3):
-        row, matrix = sums[c], inverse[which[c]]
-        row[:] = 0.0
-        for j in range(n):
-            f, column = force[j, c], matrix[j]
-            for i in range(n):
-                row[i] += column[i] * f
-    for i in range(n):
+    for i in range(force.shape[0]):
         for c in range(3):
-            a[i, c] = sums[c, i]
+            a[i, c] = share[i, c] * force[i, c]
 
 
 @register_jitable
@@ -136,11 +128,10 @@ def rates_kernel(balance: Callable) -> Callable:
     """Rates of change."""
 
     @kernel
-    def rates(y, damping, body, factors, patterns, mass, force, sums, f):
+    def rates(y, damping, body, factors, patterns, mass, force, work, f):
         """f = dy/dt of y = (x, v), both (2, n, 3): velocities and accelerations, 0 where driven."""
-        inverse, which, share = mass
         balance(y[0], body, factors, patterns, force)
-        solve_mass(inverse, which, share, force, sums, f[1])
+        solve_mass(mass, force, work, f[1])
         for i in range(y.shape[1]):
             for c in range(3):
                 f[0, i, c] = y[1, i, c]
@@ -153,23 +144,22 @@ def march_kernel(balance: Callable) -> Callable:
     """Whole steps of the central difference."""
 
     @kernel
-    def march(x, v, a, h, damping, body, factors, patterns, mass, graph, force, sums):
+    def march(x, v, a, h, damping, body, factors, patterns, mass, graph, force, work):
         """As many steps h as factors has rows but one; x, v, a move on. Returns work of the loads and loss.
 
         v at half a step: v + h/2 a; x + h v; then a at the end, where the damping is implicit.
         """
-        inverse, which, share = mass
         pointers, columns, values = graph
-        work = loss = 0.0
+        done = loss = 0.0
         for step in range(factors.shape[0] - 1):
             drift(x, v, a, h)
-            work += h * power((factors[step] + factors[step + 1]) / 2, patterns, v)
+            done += h * power((factors[step] + factors[step + 1]) / 2, patterns, v)
             if damping != 0.0:
                 loss += h * damping * kinetic_square(pointers, columns, values, v)
             balance(x, body, factors[step + 1], patterns, force)
-            solve_mass(inverse, which, share, force, sums, a)
+            solve_mass(mass, force, work, a)
             kick(v, a, h, damping)
-        return work, loss
+        return done, loss
 
     return march
 

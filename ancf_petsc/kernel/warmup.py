@@ -12,6 +12,7 @@ from ancf_petsc.element.element import Element
 from ancf_petsc.kernel.choice import way_of
 from ancf_petsc.kernel.compiled import CACHE_FOLDER
 from ancf_petsc.kernel.constant import add_mass, add_mass_blocks, mass_product
+from ancf_petsc.kernel.envelope import envelope, factorise, solve_fields
 from ancf_petsc.kernel.graph import block_starts, neighbours
 from ancf_petsc.kernel.motion import MotionKernels
 from ancf_petsc.kernel.tables import nodes_with_slopes
@@ -79,13 +80,17 @@ def _compile_mass(element: Element, cells, pointers, columns, driven, values) ->
 def _compile_motion(kernels: MotionKernels, body: tuple, x: NDArray, graph: tuple[NDArray, NDArray]) -> None:
     n = len(x)
     still, factors, patterns = np.zeros((n, 3)), np.zeros((1, 1)), np.zeros((1, n, 3))
-    mass = (np.zeros((0, 0, 0)), np.zeros(3, np.int64), still)
+    starts = envelope(*graph)
+    factors = np.zeros((1, starts[-1]))
+    mass = (starts, factors, np.zeros(3, np.int64), still)
+    factorise(starts, *graph, np.zeros(len(graph[1])), np.zeros(n, bool), factors[0])
+    solve_fields(starts, factors, mass[2], still, np.empty((3, n)))
     weighed = (*graph, np.zeros(len(graph[1])))
-    force, sums, values = np.empty((n, 3)), np.empty((3, n)), np.empty((n, 3))
+    force, work, values = np.empty((n, 3)), np.empty((3, n)), np.empty((n, 3))
     y = np.stack((x, still))
     y.setflags(write=False)  # as PETSc lends its arrays
-    kernels.rates(y, 0.0, body, factors[0], patterns, mass, force, sums, np.empty((2, n, 3)))
-    kernels.march(x.copy(), still, values, 0.0, 0.0, body, factors, patterns, mass, weighed, force, sums)
+    kernels.rates(y, 0.0, body, factors[0], patterns, mass, force, work, np.empty((2, n, 3)))
+    kernels.march(x.copy(), still, values, 0.0, 0.0, body, factors, patterns, mass, weighed, force, work)
     kernels.unbalance(y[0], y[1], 0.0, still, body, factors[0], patterns, weighed, force, values)
 
 

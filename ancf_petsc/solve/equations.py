@@ -38,10 +38,6 @@ class Equations:
         self._steady = all(load.ramp.kind == "constant" for load in model.loads)
         self._loads = assembly.external_force(0.0)
 
-    def destroy(self) -> None:
-        """Free PETSc's objects."""
-        self.solver.destroy()
-
     @cached_property
     def fused(self) -> FusedMotion | None:
         """The motion in compiled loops, where the body is simple enough."""

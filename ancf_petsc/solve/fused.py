@@ -23,7 +23,7 @@ class FusedMotion:
         self._body = (cells, gradients, volumes, region.parameters)
         n = model.owned
         self._patterns = np.array([load.pattern for load in model.loads]).reshape(-1, n, 3)
-        self._mass = solver.explicit_inverse()
+        self._mass = solver.factors()
         self._graph = (*assembly.graph, mass.values)
         self._shape = (2, n, 3)
         self._buffers = (np.empty((n, 3)), np.empty((3, n)))
@@ -33,10 +33,10 @@ class FusedMotion:
 
     @staticmethod
     def fits(mass: Mass, solver: MassSolver, *, moving: bool) -> bool:
-        """One rank, one material, an element with such kernels, nothing driven along, a mass that is inverted."""
+        """One rank, one material, an element with such kernels, nothing driven along, a mass that is factored."""
         model = mass.assembly.model
         simple = mass.comm.size == 1 and len(model.regions) == 1 and not moving
-        return simple and way_of(model.element).motion is not None and solver.is_inverted
+        return simple and way_of(model.element).motion is not None and solver.is_factored
 
     def rates(self, t: float, y: NDArray, f: NDArray) -> None:
         """f = dy/dt of y = (x, v), flat, at time t."""
