@@ -1,5 +1,5 @@
 """Motion of element 3413 in compiled loops: rates of change, whole steps of the central difference, and the
-balance of an implicit step.
+balance of an implicit step; `adaptive` and `implicit` have the steps that are made of them.
 
 For a body of one material on one rank, whose driven degrees of freedom rest: what a step costs is then its
 arithmetic, not the interpreter's. Arrays as in `tet3413`, with n nodal vectors:
@@ -18,10 +18,13 @@ from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
+import numpy as np
 from numba.extending import register_jitable
 
+from ancf_petsc.kernel.adaptive import leap_kernel
 from ancf_petsc.kernel.compiled import kernel
 from ancf_petsc.kernel.envelope import solve_components
+from ancf_petsc.kernel.implicit import alpha_kernel
 from ancf_petsc.kernel.tet3413 import edge_sum, nodes_of, scatter_force
 from ancf_petsc.material.models import Law
 
@@ -32,6 +35,8 @@ class MotionKernels(NamedTuple):
     rates: Callable
     march: Callable
     unbalance: Callable
+    leap: Callable
+    alpha: Callable
 
 
 @register_jitable
@@ -85,16 +90,23 @@ def power(factors, patterns, v):
 
 
 @register_jitable
+def carried_by(first, last, columns, values, v):
+    """One row of M v: entries first to last."""
+    x = y = z = 0.0
+    for k in range(first, last):
+        j, m = np.uint32(columns[k]), values[k]
+        x += m * v[j, 0]
+        y += m * v[j, 1]
+        z += m * v[j, 2]
+    return x, y, z
+
+
+@register_jitable
 def kinetic_square(pointers, columns, values, v):
     """v . M v."""
     total = 0.0
     for i in range(pointers.size - 1):
-        x = y = z = 0.0
-        for k in range(pointers[i], pointers[i + 1]):
-            j, m = columns[k], values[k]
-            x += m * v[j, 0]
-            y += m * v[j, 1]
-            z += m * v[j, 2]
+        x, y, z = carried_by(pointers[i], pointers[i + 1], columns, values, v)
         total += x * v[i, 0] + y * v[i, 1] + z * v[i, 2]
     return total
 
@@ -103,7 +115,10 @@ def kinetic_square(pointers, columns, values, v):
 def make_motion_kernels(law: Law) -> MotionKernels:
     """Compiled loops for one law."""
     balance = balance_of(law.stress)
-    return MotionKernels(rates_kernel(balance), march_kernel(balance), unbalance_kernel(balance))
+    rates, unbalance = rates_of(balance), unbalance_of(balance)
+    return MotionKernels(
+        kernel(rates), march_kernel(balance), kernel(unbalance), leap_kernel(rates), alpha_kernel(unbalance)
+    )
 
 
 def balance_of(stress: Callable) -> Callable:
@@ -124,10 +139,10 @@ def balance_of(stress: Callable) -> Callable:
     return balance
 
 
-def rates_kernel(balance: Callable) -> Callable:
-    """Rates of change."""
+def rates_of(balance: Callable) -> Callable:
+    """Rates of change, to stand in others."""
 
-    @kernel
+    @register_jitable
     def rates(y, damping, body, factors, patterns, mass, force, work, f):
         """f = dy/dt of y = (x, v), both (2, n, 3): velocities and accelerations, 0 where driven."""
         balance(y[0], body, factors, patterns, force)
@@ -164,10 +179,10 @@ def march_kernel(balance: Callable) -> Callable:
     return march
 
 
-def unbalance_kernel(balance: Callable) -> Callable:
-    """The balance of an implicit step."""
+def unbalance_of(balance: Callable) -> Callable:
+    """The balance of an implicit step, to stand in others."""
 
-    @kernel
+    @register_jitable
     def unbalance(x, d, part, carried, body, factors, patterns, graph, force, values):
         """values (n, 3): M carried + Q(x + part d) - Q_e. Returns the sum of the squares of the three."""
         pointers, columns, masses = graph
@@ -177,12 +192,11 @@ def unbalance_kernel(balance: Callable) -> Callable:
         balance(values, body, factors, patterns, force)
         total = 0.0
         for i in range(x.shape[0]):
+            inertia = carried_by(pointers[i], pointers[i + 1], columns, masses, carried)
             for c in range(3):
-                inertia, given = 0.0, load(factors, patterns, i, c)
-                for k in range(pointers[i], pointers[i + 1]):
-                    inertia += masses[k] * carried[columns[k], c]
-                values[i, c] = inertia - force[i, c]
-                total += inertia**2 + (given - force[i, c]) ** 2 + given**2
+                given = load(factors, patterns, i, c)
+                total += inertia[c] ** 2 + (given - force[i, c]) ** 2 + given**2
+                values[i, c] = inertia[c] - force[i, c]
         return total
 
     return unbalance

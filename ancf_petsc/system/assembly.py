@@ -16,6 +16,7 @@ from petsc4py import PETSc
 
 from ancf_petsc.kernel.constant import add_mass_blocks
 from ancf_petsc.kernel.graph import block_starts, neighbours
+from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.system.model import Model
 
 
@@ -116,7 +117,7 @@ class Assembly:
 
     def smallest_det(self, x: PETSc.Vec) -> float:
         """Smallest det F over all cells."""
-        return self.comm.allreduce(self.internal_force(x)[1], MPI.MIN)
+        return combined(self.comm, self.internal_force(x)[1], MPI.MIN)
 
     def strain_energy(self, x: PETSc.Vec) -> float:
         """Strain energy of the whole body."""
@@ -127,7 +128,7 @@ class Assembly:
             )
             for region in self.model.regions
         ]
-        return self.comm.allreduce(sum(own))
+        return combined(self.comm, sum(own))
 
     def tangent_product(self, x: PETSc.Vec, direction: PETSc.Vec) -> NDArray:
         """The tangent at x times a direction: (n, 3) on owned nodal vectors, driven rows and columns included."""
@@ -185,6 +186,11 @@ class Assembly:
             matrix.setOption(PETSc.Mat.Option.SYMMETRIC, flag=True)
             matrix.setOption(PETSc.Mat.Option.SYMMETRY_ETERNAL, flag=True)
         return matrix
+
+    @property
+    def matrix_values(self) -> NDArray[np.float64]:
+        """The entries of the matrix made last, row after row where there is one rank."""
+        return self._values
 
     def tangent(self, x: PETSc.Vec, matrix: PETSc.Mat, add: Callable[[], None] | None = None) -> None:
         """Fill the matrix with the tangent at x, and what `add` adds to it (`add_mass`)."""
@@ -252,8 +258,8 @@ class Assembly:
         free = np.ones(len(diagonal), bool)
         free[self.driven] = False
         total, count, largest = diagonal[free].sum(), free.sum(), np.abs(diagonal[free]).max(initial=0.0)
-        total, count = self.comm.allreduce(np.array([total, count]))
-        self.largest_diagonal = self.comm.allreduce(largest, MPI.MAX)
+        total, count = combined(self.comm, np.array([total, count]))
+        self.largest_diagonal = combined(self.comm, largest, MPI.MAX)
         values[self._diagonal[self.driven]] = (
             total / count if count and total > 0.0 else self.largest_diagonal or 1.0
         )
@@ -262,7 +268,7 @@ class Assembly:
 
     def _share(self, own_pointers, own_columns, other_pointers, other_columns) -> PETSc.Mat:
         """PETSc's matrix on this object's array of values."""
-        n, total = 3 * self.model.owned, self.comm.allreduce(3 * self.model.owned)
+        n, total = 3 * self.model.owned, combined(self.comm, 3 * self.model.owned)
         own = (*_scalar_rows(own_pointers, own_columns), self._values[: self._split])
         sizes = ((n, total), (n, total))
         if self.comm.size == 1:
