@@ -45,12 +45,12 @@ def test_a_rotating_block_has_the_energy_and_momentum_of_a_rigid_body():
     np.testing.assert_allclose(angular, inertia * spin + orbital, rtol=1e-12)
 
 
-def test_three_ways_of_solving_agree():
-    """Inverse, Cholesky and Chebyshev, the last to the 1e-13 it iterates to; supports by component."""
+def test_both_ways_of_solving_agree():
+    """Cholesky and Chebyshev, the latter to the 1e-13 it iterates to; supports by component."""
 
     def look(motion):
         b = np.random.default_rng(1).normal(size=(motion.assembly.model.owned, 3))
-        answers = [MassSolver(motion.mass, way).solve(b) for way in ("inverse", "cholesky", "chebyshev")]
+        answers = [MassSolver(motion.mass, way).solve(b) for way in ("cholesky", "chebyshev")]
         free = motion.equations.solver.free
         return answers, [np.where(free, motion.mass.times(a) - b, 0.0) for a in answers], free
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
+
+from ancf_petsc.launcher import OF_A_LAUNCHER, quick_if_alone
 
 
 def test_ranks_see_each_other(mpirun):
@@ -27,3 +31,24 @@ def test_a_hanging_program_is_stopped(mpirun):
 
 def test_mpi_runs_single_threaded_blas(environment):
     assert environment["OMP_NUM_THREADS"] == "1"
+
+
+def test_mpi_of_a_process_alone_looks_for_no_others(monkeypatch):
+    """What the user has set stays, and nothing is left for processes started later."""
+    for name in [
+        name for name in os.environ if name.startswith((*OF_A_LAUNCHER, "OMPI_MCA_pml", "OMPI_MCA_btl"))
+    ]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("OMPI_MCA_btl", "self,tcp")
+    before = dict(os.environ)
+    with quick_if_alone():
+        inside = dict(os.environ)
+    assert dict(os.environ) == before
+    assert (inside["OMPI_MCA_pml"], inside["OMPI_MCA_btl"]) == ("ob1", "self,tcp")
+
+
+def test_mpi_of_ranks_is_left_as_it_is(monkeypatch):
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "0")
+    before = dict(os.environ)
+    with quick_if_alone():
+        assert dict(os.environ) == before

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import fcntl
+import resource
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import h5py
 import meshio
@@ -18,7 +20,7 @@ from mpi4py import MPI
 from ancf_petsc.errors import EnvironmentProblem
 from ancf_petsc.results.store import ResultStore
 from ancf_petsc.results.tables import read_table
-from ancf_petsc.results.xdmf import CELL_KINDS
+from ancf_petsc.results.xdmf import CELL_KINDS, Dataset, Xdmf
 
 WRITER = Path(run.__file__)
 LAST = run.TIMES[-1]
@@ -132,6 +134,7 @@ def test_a_viewer_that_holds_the_file_does_not_stop_the_run(tmp_path):
 FAILING = """
 import sys
 import fcntl
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -164,3 +167,34 @@ def test_a_full_disk_is_an_environment_problem(tmp_path):
     (tmp_path / "results.h5").mkdir()
     with pytest.raises(EnvironmentProblem, match=r"results\.h5: cannot be written"):
         ResultStore(tmp_path, MPI.COMM_SELF, "t", "SI")
+
+
+def test_the_steps_in_xdmf_grow_without_writing_it_anew(tmp_path):
+    """The file stays the same one; every state of it is well-formed and lists the steps so far."""
+    xdmf = Xdmf(tmp_path / "results.xdmf", "results.h5")
+    xdmf.set_mesh("tetra", Dataset("/mesh/points", (4, 3)), Dataset("/mesh/cells", (1, 4), integer=True))
+    files = set()
+    for step in range(5):
+        xdmf.add_step(0.1 * step, [Dataset(f"/steps/{step:05d}/displacement", (4, 3))])
+        xdmf.write()
+        files.add(xdmf.path.stat().st_ino)
+        times = ElementTree.parse(xdmf.path).getroot().iter("Time")
+        assert [float(time.get("Value")) for time in times] == [0.1 * k for k in range(step + 1)]
+    assert len(files) == 1
+
+
+def test_xdmf_is_whole_after_a_step_there_was_no_space_for(tmp_path):
+    xdmf = Xdmf(tmp_path / "results.xdmf", "results.h5")
+    xdmf.set_mesh("tetra", Dataset("/mesh/points", (4, 3)), Dataset("/mesh/cells", (1, 4), integer=True))
+    xdmf.add_step(0.0, [])
+    xdmf.write()
+    before = xdmf.path.read_bytes()
+    xdmf.add_step(1.0, [Dataset("/steps/00001/displacement", (4, 3))])
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) + 10, limit[1]))
+    try:
+        with pytest.raises(OSError, match="No space left|File too large"):
+            xdmf.write()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+    assert xdmf.path.read_bytes() == before

@@ -94,7 +94,6 @@ class Motion:
     def destroy(self) -> None:
         """Free PETSc's objects."""
         self.integrator.destroy()
-        self.equations.destroy()
 
 
 def set_velocity(v: PETSc.Vec, mass: Mass, spec: InitialSpec) -> None:

@@ -14,6 +14,7 @@ from ancf_petsc.case.clock import Clock
 from ancf_petsc.case.record import Record
 from ancf_petsc.errors import Interrupted, MotionStopped
 from ancf_petsc.log import STEPS
+from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.dynamics import TimeIntegration
 from ancf_petsc.solve.integrators import Step
 from ancf_petsc.system.measures import AXES, conjugates
@@ -104,7 +105,7 @@ class MotionRun:
             if equations.moving:
                 balance = equations.out_of_balance(self.integrator.time, self.integrator.x, v, a)
         rates = [float(np.vdot(load.pattern, v)) for load in model.loads]
-        loss, loss_rate, *rates = self.assembly.comm.allreduce(np.array([loss, loss_rate, *rates]))
+        loss, loss_rate, *rates = combined(self.assembly.comm, np.array([loss, loss_rate, *rates]))
         reactions, seen = conjugates(self.assembly, self.integrator.x, balance)
         alpha = equations.damping
         return Powers(alpha * loss, alpha * loss_rate, seen, np.array(rates), reactions)
@@ -126,7 +127,7 @@ class MotionRun:
             balance = self.equations.out_of_balance(now, x, v, self._acceleration())
             more = {**self._energies(), **self._momenta(), **self._since}
             row = self.record.write({"time": now}, x, balance, more, {"velocity": v})
-        self._tell(row)
+            self._tell(row)
         self._since = dict.fromkeys(COUNTS, 0)
         self._written = now
 
@@ -150,7 +151,7 @@ class MotionRun:
             for load in self.assembly.model.loads
             if load.acceleration is not None
         )
-        return self.assembly.comm.allreduce(own)
+        return combined(self.assembly.comm, own)
 
     def _momenta(self) -> dict[str, float]:
         linear, angular = self.mass.momenta(self.integrator.x, self._velocity())

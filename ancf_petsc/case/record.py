@@ -14,7 +14,7 @@ from ancf_petsc.case.blueprint import STROKE
 from ancf_petsc.case.build import Built
 from ancf_petsc.case.drawn import DrawnPoints
 from ancf_petsc.case.schema import CaseSpec
-from ancf_petsc.parallel.exchange import ToSlabs
+from ancf_petsc.parallel.exchange import ToSlabs, combined
 from ancf_petsc.results.store import ResultStore
 from ancf_petsc.results.tables import Table
 from ancf_petsc.system.assembly import Assembly
@@ -60,7 +60,7 @@ class Record:
         """
         strain, cauchy, det = self.assembly.fields(x)
         row = {**time, **self.curve(x, out_of_balance), **self._stress_force(cauchy)}
-        row |= self._energies(x, more) | {"min_det_F": self.comm.allreduce(det.min(initial=np.inf), MPI.MIN)}
+        row |= self._energies(x, more) | {"min_det_F": combined(self.comm, det.min(initial=np.inf), MPI.MIN)}
         row |= {name: value for name, value in more.items() if name not in row} | self._reactions(
             out_of_balance
         )

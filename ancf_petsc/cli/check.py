@@ -6,6 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from ancf_petsc.cli.run import add_case_arguments, changes
+from ancf_petsc.launcher import quick_if_alone
 
 if TYPE_CHECKING:
     from ancf_petsc.case.blueprint import Blueprint
@@ -20,7 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(arguments: argparse.Namespace) -> int:
-    from mpi4py import MPI
+    with quick_if_alone():
+        from mpi4py import MPI
 
     from ancf_petsc.case.blueprint import draw
     from ancf_petsc.case.load import load_case

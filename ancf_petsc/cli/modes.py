@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ancf_petsc.cli.run import add_case_arguments, changes
 from ancf_petsc.errors import CaseError
+from ancf_petsc.launcher import quick_if_alone
 
 HELP = "natural frequencies and shapes of a case's body"
 PETSC_OPTIONS = True
@@ -23,7 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(arguments: argparse.Namespace) -> int:
-    from mpi4py import MPI
+    with quick_if_alone():
+        from mpi4py import MPI
 
     from ancf_petsc import log
     from ancf_petsc.case.load import load_case

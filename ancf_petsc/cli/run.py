@@ -6,6 +6,8 @@ import argparse
 import time
 from pathlib import Path
 
+from ancf_petsc.launcher import quick_if_alone
+
 HELP = "solve a case; under mpiexec -n N on N ranks"
 PETSC_OPTIONS = True
 
@@ -42,7 +44,8 @@ def changes(arguments: argparse.Namespace) -> list[str]:
 
 def execute(arguments: argparse.Namespace) -> int:
     begun = time.perf_counter()
-    from mpi4py import MPI
+    with quick_if_alone():
+        from mpi4py import MPI
 
     from ancf_petsc import log
     from ancf_petsc.case.load import load_case

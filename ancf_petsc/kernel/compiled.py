@@ -50,6 +50,10 @@ CACHE_FOLDER = cache_folder()
 numba.config.CACHE_DIR = str(CACHE_FOLDER)
 
 
+REGROUPED = {"contract", "reassoc"}
+"""Mathematics of a sum whose terms may be added in any order."""
+
+
 def kernel(function: Callable) -> Callable:
     """Compile a pure loop, keep its machine code, divide like IEEE 754 does; products and sums may be fused."""
     return numba.njit(function, cache=True, error_model="numpy", nogil=True, fastmath={"contract"})

@@ -1,15 +1,15 @@
 """Motion of element 3413 in compiled loops: rates of change, whole steps of the central difference, and the
-balance of an implicit step.
+balance of an implicit step; `adaptive` and `implicit` have the steps that are made of them.
 
 For a body of one material on one rank, whose driven degrees of freedom rest: what a step costs is then its
 arithmetic, not the interpreter's. Arrays as in `tet3413`, with n nodal vectors:
     x, v, a (n, 3)        positions, velocities, accelerations
     factors (m, l)        of the loads at m times, patterns (l, n, 3) of the loads
-    inverse (k, n, n)     inverses of the consistent mass of free nodes, zero elsewhere; none with lumped mass
-    which (3,)            the inverse that serves each component
+    starts (n+1,), factors (k, size), which (3,)  of the consistent mass (`envelope`): component c is solved
+                          for by factor which[c]; no factors with lumped mass
     share (n, 3)          1 / mass of free components, 0 of driven ones: the inverse of a lumped mass
     pointers, columns, values  the mass, one number for a pair of nodes
-    force (n, 3), sums (3, n)  overwritten
+    force (n, 3), work (3, n)  overwritten
 """
 
 from __future__ import annotations
@@ -18,9 +18,13 @@ from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
+import numpy as np
 from numba.extending import register_jitable
 
+from ancf_petsc.kernel.adaptive import leap_kernel
 from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.kernel.envelope import solve_components
+from ancf_petsc.kernel.implicit import alpha_kernel
 from ancf_petsc.kernel.tet3413 import edge_sum, nodes_of, scatter_force
 from ancf_petsc.material.models import Law
 
@@ -31,27 +35,20 @@ class MotionKernels(NamedTuple):
     rates: Callable
     march: Callable
     unbalance: Callable
+    leap: Callable
+    alpha: Callable
 
 
 @register_jitable
-def solve_mass(inverse, which, share, force, sums, a):
+def solve_mass(mass, force, work, a):
     """Accelerations (n, 3) of forces (n, 3)."""
-    n = force.shape[0]
-    if inverse.shape[0] == 0:
-        for i in range(n):
-            for c in range(3):
-                a[i, c] = share[i, c] * force[i, c]
+    starts, factors, which, share = mass
+    if factors.shape[0]:
+        solve_components(starts, factors, which, force, work, a)
         return
-    for c in range(3):
-        row, matrix = sums[c], inverse[which[c]]
-        row[:] = 0.0
-        for j in range(n):
-            f, column = force[j, c], matrix[j]
-            for i in range(n):
-                row[i] += column[i] * f
-    for i in range(n):
+    for i in range(force.shape[0]):
         for c in range(3):
-            a[i, c] = sums[c, i]
+            a[i, c] = share[i, c] * force[i, c]
 
 
 @register_jitable
@@ -93,16 +90,23 @@ def power(factors, patterns, v):
 
 
 @register_jitable
+def carried_by(first, last, columns, values, v):
+    """One row of M v: entries first to last."""
+    x = y = z = 0.0
+    for k in range(first, last):
+        j, m = np.uint32(columns[k]), values[k]
+        x += m * v[j, 0]
+        y += m * v[j, 1]
+        z += m * v[j, 2]
+    return x, y, z
+
+
+@register_jitable
 def kinetic_square(pointers, columns, values, v):
     """v . M v."""
     total = 0.0
     for i in range(pointers.size - 1):
-        x = y = z = 0.0
-        for k in range(pointers[i], pointers[i + 1]):
-            j, m = columns[k], values[k]
-            x += m * v[j, 0]
-            y += m * v[j, 1]
-            z += m * v[j, 2]
+        x, y, z = carried_by(pointers[i], pointers[i + 1], columns, values, v)
         total += x * v[i, 0] + y * v[i, 1] + z * v[i, 2]
     return total
 
@@ -111,7 +115,10 @@ def kinetic_square(pointers, columns, values, v):
 def make_motion_kernels(law: Law) -> MotionKernels:
     """Compiled loops for one law."""
     balance = balance_of(law.stress)
-    return MotionKernels(rates_kernel(balance), march_kernel(balance), unbalance_kernel(balance))
+    rates, unbalance = rates_of(balance), unbalance_of(balance)
+    return MotionKernels(
+        kernel(rates), march_kernel(balance), kernel(unbalance), leap_kernel(rates), alpha_kernel(unbalance)
+    )
 
 
 def balance_of(stress: Callable) -> Callable:
@@ -132,15 +139,14 @@ def balance_of(stress: Callable) -> Callable:
     return balance
 
 
-def rates_kernel(balance: Callable) -> Callable:
-    """Rates of change."""
+def rates_of(balance: Callable) -> Callable:
+    """Rates of change, to stand in others."""
 
-    @kernel
-    def rates(y, damping, body, factors, patterns, mass, force, sums, f):
+    @register_jitable
+    def rates(y, damping, body, factors, patterns, mass, force, work, f):
         """f = dy/dt of y = (x, v), both (2, n, 3): velocities and accelerations, 0 where driven."""
-        inverse, which, share = mass
         balance(y[0], body, factors, patterns, force)
-        solve_mass(inverse, which, share, force, sums, f[1])
+        solve_mass(mass, force, work, f[1])
         for i in range(y.shape[1]):
             for c in range(3):
                 f[0, i, c] = y[1, i, c]
@@ -153,31 +159,30 @@ def march_kernel(balance: Callable) -> Callable:
     """Whole steps of the central difference."""
 
     @kernel
-    def march(x, v, a, h, damping, body, factors, patterns, mass, graph, force, sums):
+    def march(x, v, a, h, damping, body, factors, patterns, mass, graph, force, work):
         """As many steps h as factors has rows but one; x, v, a move on. Returns work of the loads and loss.
 
         v at half a step: v + h/2 a; x + h v; then a at the end, where the damping is implicit.
         """
-        inverse, which, share = mass
         pointers, columns, values = graph
-        work = loss = 0.0
+        done = loss = 0.0
         for step in range(factors.shape[0] - 1):
             drift(x, v, a, h)
-            work += h * power((factors[step] + factors[step + 1]) / 2, patterns, v)
+            done += h * power((factors[step] + factors[step + 1]) / 2, patterns, v)
             if damping != 0.0:
                 loss += h * damping * kinetic_square(pointers, columns, values, v)
             balance(x, body, factors[step + 1], patterns, force)
-            solve_mass(inverse, which, share, force, sums, a)
+            solve_mass(mass, force, work, a)
             kick(v, a, h, damping)
-        return work, loss
+        return done, loss
 
     return march
 
 
-def unbalance_kernel(balance: Callable) -> Callable:
-    """The balance of an implicit step."""
+def unbalance_of(balance: Callable) -> Callable:
+    """The balance of an implicit step, to stand in others."""
 
-    @kernel
+    @register_jitable
     def unbalance(x, d, part, carried, body, factors, patterns, graph, force, values):
         """values (n, 3): M carried + Q(x + part d) - Q_e. Returns the sum of the squares of the three."""
         pointers, columns, masses = graph
@@ -187,12 +192,11 @@ def unbalance_kernel(balance: Callable) -> Callable:
         balance(values, body, factors, patterns, force)
         total = 0.0
         for i in range(x.shape[0]):
+            inertia = carried_by(pointers[i], pointers[i + 1], columns, masses, carried)
             for c in range(3):
-                inertia, given = 0.0, load(factors, patterns, i, c)
-                for k in range(pointers[i], pointers[i + 1]):
-                    inertia += masses[k] * carried[columns[k], c]
-                values[i, c] = inertia - force[i, c]
-                total += inertia**2 + (given - force[i, c]) ** 2 + given**2
+                given = load(factors, patterns, i, c)
+                total += inertia[c] ** 2 + (given - force[i, c]) ** 2 + given**2
+                values[i, c] = inertia[c] - force[i, c]
         return total
 
     return unbalance

@@ -13,7 +13,9 @@ from ancf_petsc.kernel import blocks, coarse
 from ancf_petsc.kernel.choice import way_of
 from ancf_petsc.kernel.compiled import CACHE_FOLDER
 from ancf_petsc.kernel.constant import add_mass, add_mass_blocks, mass_product
+from ancf_petsc.kernel.envelope import envelope, factorise, solve_fields
 from ancf_petsc.kernel.graph import block_starts, neighbours
+from ancf_petsc.kernel.implicit import Progress, Scheme, Test
 from ancf_petsc.kernel.motion import MotionKernels
 from ancf_petsc.kernel.tables import nodes_with_slopes
 from ancf_petsc.material.models import Law
@@ -101,14 +103,36 @@ def _compile_blocks(pointers, columns, values) -> None:
 def _compile_motion(kernels: MotionKernels, body: tuple, x: NDArray, graph: tuple[NDArray, NDArray]) -> None:
     n = len(x)
     still, factors, patterns = np.zeros((n, 3)), np.zeros((1, 1)), np.zeros((1, n, 3))
-    mass = (np.zeros((0, 0, 0)), np.zeros(3, np.int64), still)
+    starts = envelope(*graph)
+    kept = np.zeros((1, starts[-1]))
+    mass = (starts, kept, np.zeros(3, np.int64), still)
+    factorise(starts, *graph, np.zeros(len(graph[1])), np.zeros(n, bool), kept[0])
+    solve_fields(starts, kept, mass[2], still, np.empty((3, n)))
     weighed = (*graph, np.zeros(len(graph[1])))
-    force, sums, values = np.empty((n, 3)), np.empty((3, n)), np.empty((n, 3))
-    y = np.stack((x, still))
+    force, work, values = np.empty((n, 3)), np.empty((3, n)), np.empty((n, 3))
+    y, system = np.stack((x, still)), (0.0, body, factors[0], patterns, mass, force, work)
+    span, control = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0, 1.0, 1.0)
+    kernels.leap(y, span, 0, control, 0.0, weighed, system, np.empty((7, 2, n, 3)), np.empty((2, n, 3)))
+    _compile_implicit(kernels, body, y, (factors, patterns), weighed)
     y.setflags(write=False)  # as PETSc lends its arrays
-    kernels.rates(y, 0.0, body, factors[0], patterns, mass, force, sums, np.empty((2, n, 3)))
-    kernels.march(x.copy(), still, values, 0.0, 0.0, body, factors, patterns, mass, weighed, force, sums)
+    kernels.rates(y, *system, np.empty((2, n, 3)))
+    kernels.march(x.copy(), still, values, 0.0, 0.0, body, factors, patterns, mass, weighed, force, work)
     kernels.unbalance(y[0], y[1], 0.0, still, body, factors[0], patterns, weighed, force, values)
+
+
+def _compile_implicit(kernels: MotionKernels, body: tuple, y: NDArray, loads: tuple, graph: tuple) -> None:
+    n = y.shape[1]
+    v, a, d, share, *buffers = np.zeros((8, n, 3))
+    starts = np.arange(3 * n + 1)
+    factor = np.zeros(3 * n)
+    pointers = np.zeros(3 * n + 1, np.int32)  # PETSc's integers
+    envelope(pointers, pointers)
+    factorise(starts, pointers, pointers, factor, np.zeros(3 * n, bool), factor)
+    progress, scheme = Progress(0, 0, 0, np.inf, True, False), Scheme(1.0, 1.0, 1.0, 1.0, 1.0, 0.0)
+    test, solver = Test(1.0, 0.0, 0.0, 1.0, 0), (starts, factor)
+    kernels.alpha(
+        y[0].copy(), v, a, d, progress, 0, scheme, test, loads, body, graph, share, solver, tuple(buffers)
+    )
 
 
 def _mark(element: Element, law: Law, *, mean: bool, moving: bool) -> Path:

@@ -15,6 +15,11 @@ from ancf_petsc.parallel.slabs import slab_bounds
 T = TypeVar("T")
 
 
+def combined(comm: MPI.Comm, value: T, op: MPI.Op = MPI.SUM) -> T:
+    """The sum (or what `op` says) of the values of all ranks: numbers or arrays. One rank's costs nothing."""
+    return value if comm.size == 1 else comm.allreduce(value, op)
+
+
 def on_root(comm: MPI.Comm, work: Callable[[], T]) -> T | None:
     """Do `work` on the root rank; an exception there is raised on every rank. Others get None."""
     result, failure = None, None
@@ -24,7 +29,7 @@ def on_root(comm: MPI.Comm, work: Callable[[], T]) -> T | None:
         except Exception as error:  # every rank has to hear of it, whatever it is
             failure = _portable(error)
             failure.__traceback__ = error.__traceback__
-    told = comm.bcast(failure, root=0)
+    told = comm.bcast(failure, root=0) if comm.size > 1 else failure
     if told is not None:
         raise failure or told
     return result
@@ -137,5 +142,8 @@ class ToSlabs:
 
     def __call__(self, values: NDArray, into: NDArray) -> NDArray:
         """Put local `values` (k or more, ...) into the slab `into` (rows of the slab, ...), which is returned."""
+        if self.comm.size == 1:
+            into[self._targets] = values[self._order]
+            return into
         into[self._targets] = _alltoall(self.comm, values[self._order], self._sent, self._received)
         return into

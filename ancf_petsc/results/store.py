@@ -8,21 +8,20 @@ its time and more as attributes. Rows are in the mesh file's order, one contiguo
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ancf_petsc.errors import EnvironmentProblem
 from ancf_petsc.results.xdmf import Dataset, Xdmf, link_name
-
-if TYPE_CHECKING:
-    from mpi4py import MPI
 
 FORMAT = 1
 Array = NDArray[Any]
@@ -73,7 +72,18 @@ class ResultStore:
         self.steps = 0
         self._xdmf = Xdmf(self.path.with_suffix(".xdmf"), self.path.name)
         attributes = {"title": title, "units": units, "note": note, "format": FORMAT, "version": version}
-        with self._open("w") as file:
+        self._access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
+        self._access.set_fclose_degree(h5py.h5f.CLOSE_STRONG)
+        with self._agreed():
+            if self.parallel:
+                self._access.set_fapl_mpio(comm, MPI.Info())
+            elif hasattr(
+                self._access, "set_file_locking"
+            ):  # a viewer that holds the file does not stop the run
+                self._access.set_file_locking(False, False)
+            if self.parallel or comm.rank == 0:
+                h5py.h5f.create(os.fsencode(self.path), h5py.h5f.ACC_TRUNC, fapl=self._access).close()
+        with self._open() as file:
             if file:
                 file.attrs.update(attributes)
 
@@ -123,7 +133,10 @@ class ResultStore:
         with self._open() as file:
             with self._agreed():
                 if file:
-                    file.create_group(where).attrs.update({"time": time, **(extra or {})})
+                    group = h5py.Group(h5py.h5g.create(file.id, where.encode()))
+                    _put_number(group, "time", time)
+                    for name, value in (extra or {}).items():
+                        group.attrs[name] = value
             for centre, slab, fields in (
                 ("Node", self._nodes, node_fields),
                 ("Cell", self._cells, cell_fields),
@@ -149,55 +162,61 @@ class ResultStore:
         return Slab(start, start + rows, self.comm.allreduce(rows))
 
     @contextmanager
-    def _open(self, mode: str = "r+") -> Iterator[h5py.File | None]:
-        """The file, on every rank that writes. A viewer that holds the file open does not stop the run."""
+    def _open(self) -> Iterator[h5py.File | None]:
+        """The file, on every rank that writes."""
         file = None
         with self._agreed():
-            if self.parallel:
-                file = h5py.File(self.path, mode, driver="mpio", comm=self.comm)
-            elif self.comm.rank == 0:
-                file = h5py.File(self.path, mode, locking=False)
+            if self.parallel or self.comm.rank == 0:
+                number = h5py.h5f.open(os.fsencode(self.path), h5py.h5f.ACC_RDWR, self._access)
+                file = h5py.File(number)
         try:
             yield file
         except EnvironmentProblem:  # of all ranks; any other error is of this one alone, and closing waits
             if file:
-                file.close()
+                file.id.close()
             raise
         with self._agreed():
             if file:
-                file.close()
+                file.id.close()
 
     def _write(self, file: h5py.File | None, tables: list[Table]) -> None:
-        """Make all datasets, which is collective, then write slabs, which is not."""
-        with self._agreed():
-            made = [_create(file, table) for table in tables] if file else []
-        with self._agreed():
-            if file:
-                for data, table in zip(made, tables, strict=True):
-                    _write_rows(data, table.slab.start, table.rows)
+        """Make all datasets and write slabs; the root rank writes for all where this h5py cannot in parallel."""
         if not self.parallel:
             with self._agreed():
-                self._move_to_root(made, tables)
+                self._write_through_root(file, tables)
+            return
+        with self._agreed():  # collective
+            made = [_create(file, table) for table in tables] if file else []
+        with self._agreed():
+            for data, table in zip(made, tables, strict=True):
+                _write_rows(data, table.slab.start, table.rows)
 
-    def _move_to_root(self, made: list[h5py.h5d.DatasetID], tables: list[Table]) -> None:
+    def _write_through_root(self, file: h5py.File | None, tables: list[Table]) -> None:
         """One slab after the other, so that the root rank never holds a whole table."""
+        places = self._gathered([(table.slab.start, len(table.rows)) for table in tables])
+        if file is None:
+            for table in tables:
+                self.comm.Send(table.rows, 0)
+            return
         problem: OSError | RuntimeError | None = None
         for index, table in enumerate(tables):
-            for rank in range(1, self.comm.size):
-                if self.comm.rank == rank:
-                    self.comm.send((table.slab.start, len(table.rows)), 0)
-                    self.comm.Send(table.rows, 0)
-                if self.comm.rank:
-                    continue
-                start, count = self.comm.recv(source=rank)
-                rows = np.empty((count, *table.rows.shape[1:]), table.rows.dtype)
-                self.comm.Recv(rows, rank)
+            data = None
+            for rank, place in enumerate(places):
+                start, count = place[index]
+                rows = table.rows if rank == 0 else np.empty((count, *table.rows.shape[1:]), table.rows.dtype)
+                if rank:
+                    self.comm.Recv(rows, rank)
                 try:
-                    _write_rows(made[index], start, rows)
+                    data = data or _create(file, table)
+                    _write_rows(data, start, rows)
                 except (OSError, RuntimeError) as error:
                     problem = problem or error  # the others still send: take it all, then tell
         if problem:
             raise problem
+
+    def _gathered(self, value: Any) -> list[Any]:
+        """Of all ranks, on the root rank."""
+        return [value] if self.comm.size == 1 else self.comm.gather(value) or []
 
     @contextmanager
     def _agreed(self) -> Iterator[None]:
@@ -207,7 +226,8 @@ class ResultStore:
             yield
         except (OSError, RuntimeError) as error:  # h5py's two words for a write that failed
             problem = str(error)
-        if any(problems := self.comm.allgather(problem)):
+        problems = [problem] if self.comm.size == 1 else self.comm.allgather(problem)
+        if any(problems):
             reason = next(filter(None, problems))
             raise EnvironmentProblem(f"{self.path}: cannot be written: {reason}; look for space on the disk")
 
@@ -223,6 +243,12 @@ def _numbers(path: str, rows: Array, slab: Slab) -> Table:
     return Table(Dataset(path, (slab.total,), integer=True), np.ascontiguousarray(rows, np.int64), slab)
 
 
+def _put_number(group: h5py.Group, name: str, value: float) -> None:
+    """An attribute, by low-level calls."""
+    space = h5py.h5s.create(h5py.h5s.SCALAR)
+    h5py.h5a.create(group.id, name.encode(), h5py.h5t.NATIVE_DOUBLE, space).write(np.array(value, float))
+
+
 def _create(file: h5py.File, table: Table) -> h5py.h5d.DatasetID:
     """h5py's low-level calls: half the time of its datasets, which counts where steps are many and small."""
     kind = h5py.h5t.py_create(table.rows.dtype)
@@ -232,6 +258,9 @@ def _create(file: h5py.File, table: Table) -> h5py.h5d.DatasetID:
 
 def _write_rows(data: h5py.h5d.DatasetID, start: int, rows: Array) -> None:
     if len(rows) == 0:
+        return
+    if data.shape == rows.shape:
+        data.write(h5py.h5s.ALL, h5py.h5s.ALL, rows)
         return
     space = data.get_space()
     space.select_hyperslab((start, *(0,) * (rows.ndim - 1)), rows.shape)

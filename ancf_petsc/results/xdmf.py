@@ -7,6 +7,8 @@ Format: XDMF 3, https://xdmf.org/index.php/XDMF_Model_and_Format, of which only 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from errno import ENOSPC
+from os import strerror
 from pathlib import Path
 from urllib.parse import unquote
 from xml.sax.saxutils import escape, quoteattr
@@ -77,14 +79,24 @@ def attribute_type(components: tuple[int, ...]) -> str:
     return words.get(components, "Matrix")
 
 
+HEAD = (
+    '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n'
+    '<Grid Name="steps" GridType="Collection" CollectionType="Temporal">\n'
+)
+TAIL = "</Grid>\n</Domain></Xdmf>\n"
+
+
 class Xdmf:
-    """Grows by a grid a step; `write` replaces the file as a whole, so a reader never sees half of it."""
+    """Grows by a grid a step. `write` puts new grids and the closing tags over the old ones in one piece: every
+    output costs the same, however many there were, and the file is whole after each.
+    """
 
     def __init__(self, path: Path, data_file: str) -> None:
         self.path = path
         self.data_file = data_file
-        self.grids: list[str] = []
         self.mesh = ""
+        self._waiting = ""
+        self._end = 0
 
     def set_mesh(self, kind: str, points: Dataset, cells: Dataset) -> None:
         cell_kind = CELL_KINDS[kind]
@@ -104,9 +116,28 @@ class Xdmf:
                 f'<Attribute Name={quoteattr(field.name)} AttributeType="{kind}" Center="{field.centre}">'
                 f"{field.item(self.data_file)}</Attribute>\n"
             )
-        self.grids.append("".join(lines) + "</Grid>\n")
+        self._waiting += "".join(lines) + "</Grid>\n"
 
     def write(self) -> None:
-        head = '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n'
-        collection = '<Grid Name="steps" GridType="Collection" CollectionType="Temporal">\n'
-        write_atomic(self.path, head + collection + "".join(self.grids) + "</Grid>\n</Domain></Xdmf>\n")
+        """Put the steps added since the last time into the file."""
+        grids = self._waiting.encode()
+        if self._end == 0:
+            write_atomic(self.path, HEAD + self._waiting + TAIL)
+            self._end = len(HEAD.encode())
+        else:
+            self._replace_end(grids + TAIL.encode())
+        self._end += len(grids)
+        self._waiting = ""
+
+    def _replace_end(self, text: bytes) -> None:
+        """Write over the closing tags, which come back if there is no space."""
+        with self.path.open("r+b", buffering=0) as file:
+            file.seek(self._end)
+            try:
+                if file.write(text) < len(text):
+                    raise OSError(ENOSPC, strerror(ENOSPC))
+            except OSError:
+                file.seek(self._end)
+                file.write(TAIL.encode())
+                file.truncate()
+                raise

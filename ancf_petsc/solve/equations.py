@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.fused import FusedMotion
 from ancf_petsc.solve.mass_solver import MassSolver
 from ancf_petsc.system.assembly import Assembly
@@ -37,10 +38,6 @@ class Equations:
         self._piece_end = self._end_of_piece(0.0)
         self._steady = all(load.ramp.kind == "constant" for load in model.loads)
         self._loads = assembly.external_force(0.0)
-
-    def destroy(self) -> None:
-        """Free PETSc's objects."""
-        self.solver.destroy()
 
     @cached_property
     def fused(self) -> FusedMotion | None:
@@ -97,7 +94,7 @@ class Equations:
         before = self.driven_velocities(t)
         self._piece_end = self._end_of_piece(t)
         jump.ravel()[driven] = self.driven_velocities(t) - before
-        if not self.comm.allreduce(float(np.abs(jump).max(initial=0.0))):
+        if not combined(self.comm, float(np.abs(jump).max(initial=0.0))):
             return
         change = jump - self.solver.solve(self.mass.times(jump))
         v.array[:] += change.ravel()
@@ -143,12 +140,12 @@ class Equations:
         direction, omega = self.assembly.vector(), 0.0
         for _ in range(iterations):
             carried = self.mass.times(field)
-            length = np.sqrt(self.comm.allreduce(float(np.vdot(field, carried))))
+            length = np.sqrt(combined(self.comm, float(np.vdot(field, carried))))
             if length == 0.0:
                 break
             direction.array[:] = (field / length).ravel()
             field = self.solver.solve(self.assembly.tangent_product(x, direction))
-            along = self.comm.allreduce(float(np.vdot(field, carried))) / length
+            along = combined(self.comm, float(np.vdot(field, carried))) / length
             omega = float(np.sqrt(max(along, 0.0)))
         direction.destroy()
         return 1.05 * omega

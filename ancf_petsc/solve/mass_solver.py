@@ -1,85 +1,88 @@
 """Solving with the mass matrix of the free degrees of freedom.
 
-One rank: the inverse for very small bodies, else PETSc's Cholesky of the scalar mass; one of them per set
-of free nodes, all its components at once. Several ranks, or a large body: Chebyshev's iteration over the
-diagonal on fixed bounds (Golub and Varga 1961): no dot products, so every number of ranks gives the same
-numbers.
+One rank: Cholesky's factor of the scalar mass, all its components at once, one for each set of free nodes.
+Several ranks, or a body whose factor would be large: Chebyshev's iteration over the diagonal on fixed bounds
+(Golub and Varga 1961): no dot products, so every number of ranks gives the same numbers.
 """
 
 from __future__ import annotations
 
 from math import ceil, log, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from petsc4py import PETSc
-from scipy.sparse import csr_array
 
+from ancf_petsc.kernel.envelope import envelope, factorise, solve_fields
 from ancf_petsc.system.mass import Mass
 
-LARGEST_TO_INVERT, LARGEST_TO_FACTOR = 150, 20_000
+MOST_FILL = 25
+"""Entries of a factor to one of the mass up to which solving with it takes less time than iterating."""
 ACCURACY = 1e-13
 
 
+class Factors(NamedTuple):
+    """Of the mass, as `kernel/envelope` has them: starts (n+1,), factors (k, size), which (3,) serves each component.
+
+    share (n, 3): 1 / mass, 0 where driven. A lumped mass has the last alone, and no factors.
+    """
+
+    starts: NDArray[np.int64]
+    factors: NDArray[np.float64]
+    which: NDArray[np.int64]
+    share: NDArray[np.float64]
+
+
 class MassSolver:
-    """Solves M a = b on the free degrees of freedom; driven ones get 0. way: inverse, cholesky, chebyshev;
-    None chooses. is_inverted: whether there is an `explicit_inverse`.
+    """Solves M a = b on the free degrees of freedom; driven ones get 0. way: cholesky, chebyshev; None chooses.
+
+    is_factored: whether there are `factors`.
     """
 
     def __init__(self, mass: Mass, way: str | None = None) -> None:
         self.mass = mass
         model = mass.assembly.model
         self.free = model.motion[: model.owned] < 0
+        self._starts = envelope(*mass.assembly.graph) if mass.comm.size == 1 else np.zeros(1, np.int64)
         way = way or self._choose()
-        self.is_inverted = mass.lumped or way == "inverse"
-        self._factors = [] if way == "chebyshev" else self._factor(_Inverse if way == "inverse" else _Factor)
+        self.is_factored = mass.lumped or way == "cholesky"
         root = sqrt(mass.bounds[1] / mass.bounds[0])
         self._iterations = 1 if mass.lumped else ceil(log(ACCURACY / 2) / log((root - 1) / (root + 1)))
+        self._factors = self._factor() if self.is_factored else None
+        self._work = np.empty((3, model.owned))
 
     def solve(self, b: NDArray) -> NDArray[np.float64]:
         """a (n, 3) from b (n, 3) on owned nodal vectors. Collective."""
         if self.mass.lumped:
             return np.where(self.free, b / self.mass.diagonal[:, None], 0.0)
-        if self._factors:
-            result = np.zeros_like(b)
-            for factor in self._factors:
-                factor.solve(b, result)
-            return result
-        return self._chebyshev(b)
+        if self._factors is None:
+            return self._chebyshev(b)
+        result = np.array(b, order="C")
+        solve_fields(*self._factors[:3], result, self._work)
+        return result
 
-    def explicit_inverse(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Of a mass that `is_inverted`: inverses (k, n, n), the one that serves each component (3,), and 1 /
-        mass (n, 3), 0 where driven. A lumped mass has the last alone.
-        """
-        share = self.free / self.mass.diagonal[:, None]
-        which = np.zeros(3, np.int64)
-        if self.mass.lumped:
-            return np.zeros((0, 0, 0)), which, share
-        inverses = [factor for factor in self._factors if isinstance(factor, _Inverse)]
-        for k, factor in enumerate(inverses):
-            which[factor.axes] = k
-        return np.array([factor.inverse for factor in inverses]), which, share
-
-    def destroy(self) -> None:
-        """Free PETSc's objects."""
-        for factor in self._factors:
-            factor.destroy()
+    def factors(self) -> Factors:
+        """Of a mass that `is_factored`."""
+        assert self._factors is not None
+        return self._factors
 
     def _choose(self) -> str:
-        nodes = self.mass.assembly.model.owned
-        if self.mass.comm.size > 1 or self.mass.lumped or nodes > LARGEST_TO_FACTOR:
-            return "chebyshev"
-        return "inverse" if nodes <= LARGEST_TO_INVERT else "cholesky"
+        wide = self._starts[-1] > MOST_FILL * len(self.mass.values)
+        return "chebyshev" if self.mass.comm.size > 1 or self.mass.lumped or wide else "cholesky"
 
-    def _factor(self, kind: type[_Inverse] | type[_Factor]) -> list[_Inverse | _Factor]:
-        pointers, columns = self.mass.assembly.graph
-        n = len(self.free)
-        matrix = csr_array((self.mass.values, columns, pointers), shape=(n, n))
-        sets: dict[bytes, list[int]] = {}
-        for axis in range(3):
-            sets.setdefault(self.free[:, axis].tobytes(), []).append(axis)
-        rows = {key: np.flatnonzero(np.frombuffer(key, bool)) for key in sets}
-        return [kind(matrix[rows[key]][:, rows[key]], rows[key], axes, n) for key, axes in sets.items()]
+    def _factor(self) -> Factors:
+        share, which = self.free / self.mass.diagonal[:, None], np.zeros(3, np.int64)
+        if self.mass.lumped:
+            return Factors(np.zeros(1, np.int64), np.zeros((0, 0)), which, share)
+        sets = [self.free[:, axis].tobytes() for axis in range(3)]
+        kinds = list(dict.fromkeys(sets))
+        which[:] = [kinds.index(each) for each in sets]
+        factors = np.empty((len(kinds), self._starts[-1]))
+        for kind, factor in zip(kinds, factors, strict=True):
+            free = np.frombuffer(kind, bool).copy()
+            if not factorise(self._starts, *self.mass.assembly.graph, self.mass.values, free, factor):
+                raise ArithmeticError("the mass is not positive definite")
+        return Factors(self._starts, factors, which, share)
 
     def _chebyshev(self, b: NDArray) -> NDArray:
         low, high = self.mass.bounds
@@ -97,48 +100,3 @@ class MassSolver:
             result += direction
             residual -= inverse * self.mass.times(direction)
         return result
-
-
-class _Inverse:
-    """The inverse of the mass of some nodes, zero elsewhere, and the components it serves."""
-
-    def __init__(self, matrix: csr_array, rows: NDArray, axes: list[int], total: int) -> None:
-        self.axes = slice(None) if len(axes) == 3 else axes
-        self.inverse = np.zeros((total, total))
-        self.inverse[np.ix_(rows, rows)] = np.linalg.inv(matrix.toarray())
-
-    def solve(self, b: NDArray, into: NDArray) -> None:
-        into[:, self.axes] = self.inverse @ b[:, self.axes]
-
-    def destroy(self) -> None:
-        """There is nothing of PETSc's."""
-
-
-class _Factor:
-    """The factor of the mass of some nodes, and the components it serves."""
-
-    def __init__(self, matrix: csr_array, rows: NDArray, axes: list[int], _: int) -> None:
-        self.place = np.ix_(rows, np.array(axes))
-        size, count = len(rows), len(axes)
-        integers = PETSc.IntType
-        csr = (matrix.indptr.astype(integers), matrix.indices.astype(integers), matrix.data)
-        self._matrix = PETSc.Mat().createAIJ((size, size), csr=csr, comm=PETSc.COMM_SELF)
-        self._pc = PETSc.PC().create(PETSc.COMM_SELF)
-        self._pc.setOperators(self._matrix)
-        self._pc.setOptionsPrefix("mass_")
-        self._pc.setType(PETSc.PC.Type.CHOLESKY)
-        self._pc.setUp()
-        self._right, self._left = np.zeros((count, size)), np.zeros((count, size))
-        self._dense = [
-            PETSc.Mat().createDense((size, count), array=held.ravel(), comm=PETSc.COMM_SELF)
-            for held in (self._right, self._left)
-        ]
-
-    def solve(self, b: NDArray, into: NDArray) -> None:
-        self._right[:] = b[self.place].T
-        self._pc.getFactorMatrix().matSolve(*self._dense)
-        into[self.place] = self._left.T
-
-    def destroy(self) -> None:
-        for item in (self._pc, self._matrix, *self._dense):
-            item.destroy()

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
+from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.forcing import Forcing
 from ancf_petsc.solve.linear import LinearSolver
 from ancf_petsc.solve.petsc import default_options
@@ -172,6 +172,6 @@ class Newton:
 
     def _force_scale(self) -> float:
         """The largest of the norms of reactions and loads, and what rounding leaves of the tangent times the size."""
-        reactions, loads = np.sqrt(self.comm.allreduce(np.array(self._supported), MPI.SUM))
+        reactions, loads = np.sqrt(combined(self.comm, np.array(self._supported)))
         floor = 1e-14 * self.assembly.largest_diagonal * self.assembly.model.size
         return max(reactions, loads, floor / self.tolerance)

@@ -64,6 +64,11 @@ def is_given(name: str) -> bool:
     return PETSc.Options().hasName(name)
 
 
+def begins_a_given_option(*prefixes: str) -> bool:
+    """Whether the case or the command line gives an option that begins with one of these."""
+    return any(name.startswith(prefixes) for name in PETSc.Options().getAll())
+
+
 def unused_options(given: Mapping[str, object]) -> list[str]:
     """Names of the options that no PETSc object has asked for so far."""
     return [name for name in given if not _used(name)]

@@ -17,6 +17,7 @@ from petsc4py import PETSc
 
 from ancf_petsc.kernel.constant import add_mass_blocks
 from ancf_petsc.kernel.graph import block_starts, neighbours
+from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.system.model import Model
 
 
@@ -130,7 +131,7 @@ class Assembly:
 
     def smallest_det(self, x: PETSc.Vec) -> float:
         """Smallest det F over all cells."""
-        return self.comm.allreduce(self.internal_force(x)[1], MPI.MIN)
+        return combined(self.comm, self.internal_force(x)[1], MPI.MIN)
 
     def strain_energy(self, x: PETSc.Vec) -> float:
         """Strain energy of the whole body."""
@@ -141,7 +142,7 @@ class Assembly:
             )
             for region in self.model.regions
         ]
-        return self.comm.allreduce(sum(own))
+        return combined(self.comm, sum(own))
 
     def tangent_product(self, x: PETSc.Vec, direction: PETSc.Vec) -> NDArray:
         """The tangent at x times a direction: (n, 3) on owned nodal vectors, driven rows and columns included."""
@@ -188,7 +189,7 @@ class Assembly:
         self._starts = block_starts(self.model.cells, n, *self.rows[:4], 3)
         self._strides = np.zeros((len(self.model.reference), 2), np.int32)
         self._strides[:n, 0], self._strides[:n, 1] = 3 * own_counts, 3 * other_counts
-        self.values = np.zeros(9 * len(columns))
+        self.values = np.zeros(9 * len(columns))  # of the matrix made last
         self._diagonal = self._diagonal_places()
         matrix = self._share()
         matrix.setBlockSize(3)  # petsc4py leaves it out where arrays are shared
@@ -270,8 +271,8 @@ class Assembly:
         free = np.ones(len(diagonal), bool)
         free[self.driven] = False
         total, count, largest = diagonal[free].sum(), free.sum(), np.abs(diagonal[free]).max(initial=0.0)
-        total, count = self.comm.allreduce(np.array([total, count]))
-        self.largest_diagonal = self.comm.allreduce(largest, MPI.MAX)
+        total, count = combined(self.comm, np.array([total, count]))
+        self.largest_diagonal = combined(self.comm, largest, MPI.MAX)
         values[self._diagonal[self.driven]] = (
             total / count if count and total > 0.0 else self.largest_diagonal or 1.0
         )
@@ -280,7 +281,7 @@ class Assembly:
 
     def _share(self) -> PETSc.Mat:
         """PETSc's matrix on this object's array of values."""
-        rows, n, total = self.rows, 3 * self.model.owned, self.comm.allreduce(3 * self.model.owned)
+        rows, n, total = self.rows, 3 * self.model.owned, combined(self.comm, 3 * self.model.owned)
         own = (*_scalar_rows(rows.own_pointers, rows.own_columns), self.values[: rows.split])
         sizes = ((n, total), (n, total))
         if self.comm.size == 1:

@@ -16,6 +16,7 @@ from petsc4py import PETSc
 from ancf_petsc.element.element import Element
 from ancf_petsc.kernel.constant import add_mass, mass_product
 from ancf_petsc.kernel.tables import turn_functions
+from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.system.assembly import Assembly
 
 CHUNK = 1000
@@ -68,7 +69,7 @@ class Mass:
             scale = 1.0 / np.sqrt(np.einsum("eaa->ea", mass))
             values = np.linalg.eigvalsh(scale[:, :, None] * mass * scale[:, None, :])
             low, high = min(low, values.min(initial=np.inf)), max(high, values.max(initial=0.0))
-        return self.comm.allreduce(low, MPI.MIN), self.comm.allreduce(high, MPI.MAX)
+        return combined(self.comm, low, MPI.MIN), combined(self.comm, high, MPI.MAX)
 
     def times(self, field: NDArray, into: NDArray | None = None) -> NDArray[np.float64]:
         """Mass times a field (n, 3) on owned nodal vectors; driven ones are no exception. Collective."""
@@ -82,14 +83,15 @@ class Mass:
 
     def kinetic_energy(self, velocity: NDArray) -> float:
         """Kinetic energy of the whole body. Collective."""
-        return self.comm.allreduce(0.5 * float(np.vdot(velocity, self.times(velocity))))
+        return combined(self.comm, 0.5 * float(np.vdot(velocity, self.times(velocity))))
 
     def momenta(self, x: PETSc.Vec, velocity: NDArray) -> tuple[NDArray, NDArray]:
         """Linear and angular momentum (3,), the latter about the origin. Collective."""
         carried = self.times(velocity)
         linear = carried[self.assembly.model.own_positions].sum(axis=0)
-        angular = np.cross(x.array_r.reshape(-1, 3), carried).sum(axis=0)
-        both = self.comm.allreduce(np.concatenate((linear, angular)), MPI.SUM)
+        moments = x.array_r.reshape(-1, 3).T @ carried
+        angular = np.array([moments[i, j] - moments[j, i] for i, j in ((1, 2), (2, 0), (0, 1))])
+        both = combined(self.comm, np.concatenate((linear, angular)))
         return both[:3], both[3:]
 
     def centre(self) -> NDArray[np.float64]:
@@ -100,7 +102,7 @@ class Mass:
         share = self.times(uniform)[:, 0]
         moment = share @ model.reference[: model.owned]
         total = share[model.own_positions].sum()
-        sums = self.comm.allreduce(np.append(moment, total), MPI.SUM)
+        sums = combined(self.comm, np.append(moment, total))
         return sums[:3] / sums[3]
 
 

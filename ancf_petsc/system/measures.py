@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.system.assembly import Assembly
 
 AXES = ("x", "y", "z")
@@ -28,7 +28,7 @@ class CurveChoice:
 def reaction(assembly: Assembly, out_of_balance: NDArray, group: str) -> NDArray[np.float64]:
     """Sum (3,) over the group's nodes of Q - Q_e: what the support exerts on the body."""
     own = out_of_balance[assembly.model.groups[group]].sum(axis=0)
-    return assembly.comm.allreduce(own, MPI.SUM)
+    return combined(assembly.comm, own)
 
 
 def mean_position(assembly: Assembly, x: PETSc.Vec, name: str) -> tuple[NDArray, NDArray]:
@@ -36,7 +36,7 @@ def mean_position(assembly: Assembly, x: PETSc.Vec, name: str) -> tuple[NDArray,
     vectors, weights = assembly.model.means[name]
     now = weights @ x.array_r.reshape(-1, 3)[vectors]
     before = weights @ assembly.model.reference[vectors]
-    now, before = assembly.comm.allreduce(np.stack((now, before)), MPI.SUM)
+    now, before = combined(assembly.comm, np.stack((now, before)))
     return now, now - before
 
 
@@ -51,7 +51,7 @@ def mean_stress(assembly: Assembly, cauchy: NDArray, group: str, axis: int) -> f
     sums = np.bincount(model.cells.ravel(), stress, minlength=n)
     nodes = model.groups[group]
     own = np.array([(sums[nodes] / volumes[nodes]).sum(), len(nodes)])
-    total, count = assembly.comm.allreduce(own, MPI.SUM)
+    total, count = combined(assembly.comm, own)
     return total / count
 
 
@@ -62,7 +62,7 @@ def conjugates(assembly: Assembly, x: PETSc.Vec, out_of_balance: NDArray) -> tup
     reactions = np.bincount(assembly.driven_motion, values, minlength=len(model.motions))
     displacement = x.array_r.reshape(-1, 3) - model.reference[: model.owned]
     seen = np.array([float((load.pattern * displacement).sum()) for load in model.loads])
-    both = assembly.comm.allreduce(np.concatenate((reactions, seen)), MPI.SUM)
+    both = combined(assembly.comm, np.concatenate((reactions, seen)))
     return both[: len(model.motions)], both[len(model.motions) :]
 
 

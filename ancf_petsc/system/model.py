@@ -13,7 +13,7 @@ from ancf_petsc.kernel.mean import MeanKernels
 from ancf_petsc.kernel.tables import turn_functions
 from ancf_petsc.kernel.tet3413 import Kernels
 from ancf_petsc.material import Law
-from ancf_petsc.parallel.exchange import lookup, scatter_rows
+from ancf_petsc.parallel.exchange import combined, lookup, scatter_rows
 from ancf_petsc.parallel.numbering import Numbering
 from ancf_petsc.parallel.slabs import slab_bounds
 from ancf_petsc.system.constraint import Motion
@@ -82,7 +82,7 @@ class Model:
     @property
     def dof(self) -> int:
         """Degrees of freedom over all ranks, driven ones included."""
-        return self.comm.allreduce(self.element.components * self.owned)
+        return combined(self.comm, self.element.components * self.owned)
 
     @property
     def own_positions(self) -> NDArray[np.int64]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
+from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.system.model import Model
 
 
@@ -15,9 +15,9 @@ def rigid_motions(model: Model, positions: NDArray) -> NDArray[np.float64]:
     Motions out of the plane of a plane body, where a component is held everywhere, are left out. Collective.
     """
     own = model.own_positions
-    count = model.comm.allreduce(len(own))
-    centre = model.comm.allreduce(positions[own].sum(axis=0), MPI.SUM) / count
-    free = model.comm.allreduce((model.motion[: model.owned] < 0).sum(axis=0), MPI.SUM) > 0
+    count = combined(model.comm, len(own))
+    centre = combined(model.comm, positions[own].sum(axis=0)) / count
+    free = combined(model.comm, (model.motion[: model.owned] < 0).sum(axis=0)) > 0
     arms = positions / model.size
     arms[own] -= centre / model.size
     modes = np.zeros((6, model.owned, 3))
@@ -27,7 +27,7 @@ def rigid_motions(model: Model, positions: NDArray) -> NDArray[np.float64]:
     kept = np.concatenate((free, [free[[1, 2]].all(), free[[0, 2]].all(), free[[0, 1]].all()]))
     modes = modes[kept].reshape(int(kept.sum()), -1)
     for _ in range(2):
-        gram = model.comm.allreduce(modes @ modes.T, MPI.SUM)
+        gram = combined(model.comm, modes @ modes.T)
         values, vectors = np.linalg.eigh(gram)
         good = values > 1e-14 * values[-1]
         modes = (vectors[:, good] / np.sqrt(values[good])).T @ modes

@@ -17,9 +17,6 @@ from ancf_petsc.solve.equations import Equations
 from ancf_petsc.solve.fused import FusedMotion
 from ancf_petsc.solve.integrators.base import Integrator, Settings, Step
 
-CELLS_AT_ONCE = 10**7
-"""Cells times steps of one leap: about half a second between two looks at Ctrl-C."""
-
 
 class CentralDifference(Integrator):
     """Second order; keeps linear and angular momenta, its energy swings with h^2 about the true one."""
@@ -30,7 +27,6 @@ class CentralDifference(Integrator):
     def __init__(self, equations: Equations, settings: Settings, x: PETSc.Vec, v: PETSc.Vec) -> None:
         super().__init__(equations, settings, x, v)
         self.highest_frequency = equations.highest_frequency(x)
-        self._most = max(1, CELLS_AT_ONCE // max(1, len(equations.assembly.model.cells)))
         self._begun = False
 
     @property
@@ -59,7 +55,7 @@ class CentralDifference(Integrator):
 
     def _leap(self, goal: float, fused: FusedMotion) -> Step:
         parts = steps_in(goal - self.time, self.settings.step)
-        size, count = (goal - self.time) / parts, min(parts, self._most)
+        size, count = (goal - self.time) / parts, min(parts, fused.at_once)
         x, v = self.x.array.reshape(-1, 3), self.v.array.reshape(-1, 3)
         self.a = self.a.copy()
         known = fused.march(self.time, size, count, x, v, self.a)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.errors import CaseError
+from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.equations import Equations
 from ancf_petsc.solve.integrators.base import Settings
 from ancf_petsc.solve.integrators.increment import Forces
@@ -63,5 +64,5 @@ class EnergyMomentum(OneStep):
         middle = d / self.h
         lost = eq.damping * self.h * float(np.vdot(middle, eq.mass.times(middle))) if eq.damping else 0.0
         self.v.array[:] = (2 * middle - v).ravel()
-        total = eq.comm.allreduce(np.array([work, lost]))
+        total = combined(eq.comm, np.array([work, lost]))
         return float(total[0]), float(total[1])

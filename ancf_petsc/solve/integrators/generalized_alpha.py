@@ -3,7 +3,8 @@ and Hulbert (2000).
 
 The balance holds between the steps: accelerations at alpha_m, the rest at alpha_f. Second order; what the
 step does not resolve is damped, to the spectral radius. Starting accelerations come from the equations of
-motion.
+motion. A small body whose driven degrees of freedom rest moves in compiled loops, unless an option speaks of
+PETSc's solvers.
 """
 
 from __future__ import annotations
@@ -12,8 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ancf_petsc.kernel.implicit import Scheme
+from ancf_petsc.solve.dynamics import steps_in
 from ancf_petsc.solve.equations import Equations
-from ancf_petsc.solve.integrators.base import Settings
+from ancf_petsc.solve.fused_newton import FusedNewton
+from ancf_petsc.solve.integrators.base import Integrator, Settings, Step
 from ancf_petsc.solve.integrators.increment import Forces
 from ancf_petsc.solve.integrators.one_step import OneStep
 
@@ -30,7 +34,18 @@ class GeneralizedAlpha(OneStep):
         self.beta = 0.25 * (1 + self.alpha_m - self.alpha_f) ** 2
         super().__init__(equations, settings, x, v)
         self._still = np.zeros((0, 3))
+        self._fused: FusedNewton | None = None
+        fused = equations.fused
+        if fused is not None and FusedNewton.fits(equations, self.solver):
+            self._fused = FusedNewton(fused, equations, self.solver, self.tangent)
         self.restart()
+
+    @property
+    def leaps(self) -> bool:
+        return self._fused is not None
+
+    def advance(self, goal: float) -> Step:
+        return super().advance(goal) if self._fused is None else self._leap(goal, self._fused)
 
     def restart(self) -> None:
         self.a = self.equations.acceleration(self.time, self.x, self.v.array_r.reshape(-1, 3))
@@ -81,5 +96,29 @@ class GeneralizedAlpha(OneStep):
         v1, self.a = self._ends(d)
         self.v.array[:] = v1.ravel()
 
+    def _leap(self, goal: float, loop: FusedNewton) -> Step:
+        """Equal steps towards the goal: one where loss or work is summed up after each, else many."""
+        start, parts = self.time, steps_in(goal - self.time, self.settings.step)
+        size = (goal - start) / parts
+        alone = self.equations.damping or not loop.fused.steady
+        count = 1 if alone else min(parts, max(1, loop.fused.at_once // 4))
+        if abs(size - self._size) > 1e-9 * size:
+            loop.aged, self._size = True, size
+        self.h, self.a, before = size, self.a.copy(), self.x.array_r.reshape(-1, 3).copy()
+        scheme = Scheme(size, self.alpha_m, self.alpha_f, self.beta, self.gamma, self.equations.damping)
+        state = (self.x.array.reshape(-1, 3), self.v.array.reshape(-1, 3), self.a)
+        done, newton, good = loop.steps(state, start + size * (np.arange(count) + self.alpha_f), scheme)
+        self.time = goal if done == parts else start + size * done
+        if good:
+            known = None if alone else (loop.fused.work(before, state[0]), 0.0)
+            return Step(self.time, size * done, newton, newton, known=known, count=done)
+        self.solver.test.aged = True
+        last = super().advance(goal if done + 1 == parts else start + size * (done + 1))
+        newton, linear = newton + last.newton, newton + last.linear
+        return Step(self.time, size * (done + 1), newton, linear, count=done + 1)
+
     def describe(self) -> str:
+        if self._fused is not None:
+            how = f"{Integrator.describe(self)}, compiled Newton + cholesky, {self.solver.linear.dof} degrees of freedom"
+            return f"{how}, spectral radius {self.settings.spectral_radius:g}"
         return f"{super().describe()}, spectral radius {self.settings.spectral_radius:g}"

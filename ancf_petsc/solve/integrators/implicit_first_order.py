@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.equations import Equations
 from ancf_petsc.solve.integrators.base import Settings
 from ancf_petsc.solve.integrators.first_order import FirstOrder
@@ -112,7 +113,7 @@ class ImplicitFirstOrder(FirstOrder):
         if iteration == 0:
             self.test.begin()
             return PETSc.SNES.ConvergedReason.ITERATING
-        norm = float(np.sqrt(self.equations.comm.allreduce(float(values @ values))))
+        norm = float(np.sqrt(combined(self.equations.comm, float(values @ values))))
         return self.test(snes, iteration, (norms[0], norms[1], norm))
 
 

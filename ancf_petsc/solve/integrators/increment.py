@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from math import isfinite, sqrt
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.equations import Equations
 from ancf_petsc.solve.linear import LinearSolver
 from ancf_petsc.solve.petsc import default_options
@@ -64,7 +64,7 @@ class ForceTest:
         if not isfinite(residual):
             return Reason.DIVERGED_FNORM_NAN
         comm = self.equations.comm
-        forces = sqrt(self.scale if comm.size == 1 else comm.allreduce(self.scale, MPI.SUM))
+        forces = sqrt(combined(comm, self.scale))
         relative, absolute = snes.getTolerances()[:2]
         if iteration:
             self.aged = self.aged or residual > SLOW * self._before

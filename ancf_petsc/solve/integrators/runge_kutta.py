@@ -1,15 +1,18 @@
 """Explicit Runge-Kutta methods of PETSc: 5dp (Dormand and Prince 1980, the paper's ode45) and the classical
-one of order 4.
+one of order 4. Under loads that stay, steps of 5dp that adapt are made in one compiled loop where the body is simple
+enough and no option speaks of TS; it is PETSc's pair with PETSc's control.
 """
 
 from __future__ import annotations
 
 from petsc4py import PETSc
 
+from ancf_petsc.kernel.adaptive import NOT_FINITE, TOO_SHORT
 from ancf_petsc.solve.equations import Equations
-from ancf_petsc.solve.integrators.base import Settings
-from ancf_petsc.solve.integrators.first_order import FirstOrder
-from ancf_petsc.solve.petsc import default_options
+from ancf_petsc.solve.fused import FusedMotion
+from ancf_petsc.solve.integrators.base import SHORTEST, Settings, Step
+from ancf_petsc.solve.integrators.first_order import SPEED_CHANGE, FirstOrder
+from ancf_petsc.solve.petsc import begins_a_given_option, default_options
 
 
 class RungeKutta5dp(FirstOrder):
@@ -28,6 +31,28 @@ class RungeKutta5dp(FirstOrder):
         with default_options({"ts_adapt_type": "basic" if self.adaptive else "none"}):
             self.ts.setFromOptions()
         self.begin(self.longest_stable)
+        fused, free = equations.fused, not begins_a_given_option("ts_")
+        fits = fused is not None and fused.steady and free and self.adaptive and self.table == "5dp"
+        self._fused = fused if fits else None
+
+    def advance(self, goal: float) -> Step:
+        return super().advance(goal) if self._fused is None else self._leap(goal, self._fused)
+
+    def _leap(self, goal: float, fused: FusedMotion) -> Step:
+        tolerance, before = self.settings.tolerance, self.time
+        position = tolerance * self.equations.assembly.model.size
+        span = (self.time, goal, SHORTEST * self.equations.duration)
+        done = fused.leap(
+            self.y.array, span, (self._proposed, self._speed, position, tolerance, SPEED_CHANGE)
+        )
+        if done.status == NOT_FINITE:
+            raise self.failed(goal, "numbers are not finite any more")
+        if done.status == TOO_SHORT:
+            raise self.failed(goal, "steps have become too short to move on")
+        self.time, self._proposed, self._speed = done.time, done.proposed, done.speed
+        self._store()
+        known, count = (done.work, done.loss), done.steps
+        return Step(self.time, self.time - before, rejected=done.rejected, known=known, count=count)
 
     @property
     def longest_stable(self) -> float:

@@ -1,0 +1,173 @@
+"""Steps of generalised alpha in one compiled loop, by Newton with a factor that is kept as long as it does its work.
+
+The loop returns to its caller where it wants a new factor, and goes on from there. Arrays as in `motion`, and
+    d (n, 3)              increment of positions of the step at work
+    still (n, 3)          overwritten
+    starts, factor        of the derivative of the balance by d over its 3 n components (`envelope`)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numba.extending import register_jitable
+
+from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.kernel.envelope import solve_one
+
+DONE, WANTS_FACTOR, FAILED = range(3)
+
+
+class Scheme(NamedTuple):
+    """A step h of the method, in the notation of `solve/integrators/generalized_alpha`."""
+
+    h: float
+    alpha_m: float
+    alpha_f: float
+    beta: float
+    gamma: float
+    damping: float
+
+
+class Test(NamedTuple):
+    """When Newton ends: the balance below `relative` times the forces, `absolute`, or `rounding` times |x|.
+
+    slow: a fall of the balance by less asks for a new factor. most: iterations.
+    """
+
+    relative: float
+    absolute: float
+    rounding: float
+    slow: float
+    most: int
+
+
+class Progress(NamedTuple):
+    """Where the loop stands; the caller hands it back.
+
+    iteration: of the step at work. newton: iterations of the steps done. waiting: for a factor, with d and its
+    balance made.
+    """
+
+    step: int
+    iteration: int
+    newton: int
+    before: float
+    aged: bool
+    waiting: bool
+
+
+@register_jitable
+def begin(scheme, v, a, d, still):
+    """First guess of d, and what of M's factor does not depend on it."""
+    h, am, af, beta, gamma, damping = scheme
+    of_v = -am / (beta * h) + damping * ((1 - af) + af * (1 - gamma / beta))
+    of_a = (1 - am) - am * (0.5 / beta - 1) + damping * af * h * (1 - 0.5 * gamma / beta)
+    for i in range(v.shape[0]):
+        for c in range(3):
+            d[i, c] = h * v[i, c] + h * h / 2 * a[i, c]
+            still[i, c] = of_v * v[i, c] + of_a * a[i, c]
+
+
+@register_jitable
+def finish(scheme, x, v, a, d):
+    """State at the end of the step."""
+    h, _, _, beta, gamma, _ = scheme
+    for i in range(v.shape[0]):
+        for c in range(3):
+            end = (d[i, c] - h * v[i, c]) / (beta * h * h) - (0.5 / beta - 1) * a[i, c]
+            v[i, c] += h * ((1 - gamma) * a[i, c] + gamma * end)
+            a[i, c] = end
+            x[i, c] += d[i, c]
+
+
+@register_jitable
+def add_to(x, factor, y):
+    """x + factor y in x, fields (n, 3)."""
+    for i in range(x.shape[0]):
+        for c in range(3):
+            x[i, c] += factor * y[i, c]
+
+
+@register_jitable
+def norm(x):
+    """Of a field (n, 3)."""
+    total = 0.0
+    for i in range(x.shape[0]):
+        for c in range(3):
+            total += x[i, c] ** 2
+    return np.sqrt(total)
+
+
+def newton_of(unbalance: Callable) -> Callable:
+    """Newton's iterations of a step, to stand in the loop over steps."""
+
+    @register_jitable
+    def evaluate(scheme, x, d, carried, still, system, share, values):
+        """The balance of the step in values (n, 3), 0 where driven, and its norm and that of the forces."""
+        h, am, af, beta, gamma, damping = scheme
+        inertia = am / (beta * h * h) + damping * af * gamma / (beta * h)
+        carried[:] = still
+        add_to(carried, inertia, d)
+        scale = np.sqrt(unbalance(x, d, af, carried, *system, values)) / af
+        for i in range(d.shape[0]):
+            for c in range(3):
+                values[i, c] = values[i, c] / af if share[i, c] != 0.0 else 0.0
+        return norm(values), scale
+
+    @register_jitable
+    def newton(x, d, begun, waiting, scheme, test, fields, system, share, solver):
+        """Iterations on d until it balances or a factor is wanted. begun: iterations, last norm, whether aged.
+
+        Returns (status, iterations, last norm, whether aged).
+        """
+        iteration, before, aged = begun
+        carried, still, values = fields
+        floor = test.rounding * norm(x)
+        while True:
+            if not waiting:
+                residual, forces = evaluate(scheme, x, d, carried, still, system, share, values)
+                aged = aged or (iteration > 0 and residual > test.slow * before)
+                before = residual
+                if residual <= max(test.relative * forces, test.absolute, floor):
+                    return DONE, iteration, before, aged
+                if not np.isfinite(residual) or iteration == test.most:
+                    return FAILED, iteration, before, aged
+                if aged:
+                    return WANTS_FACTOR, iteration, before, aged
+            waiting = False
+            solve_one(*solver, values.reshape(-1))
+            add_to(d, -1.0, values)
+            iteration += 1
+
+    return newton
+
+
+def alpha_kernel(unbalance: Callable) -> Callable:
+    """Steps of generalised alpha."""
+    newton = newton_of(unbalance)
+
+    @kernel
+    def march(x, v, a, d, progress, count, scheme, test, loads, body, graph, share, solver, buffers):
+        """Go on to `count` steps; x, v, a move on. Returns (status, Progress)."""
+        step, iteration, done, before, aged, waiting = progress
+        factors, patterns = loads
+        carried, still, force, values = buffers
+        while step < count:
+            system = (body, factors[step], patterns, graph, force)
+            if not waiting:
+                begin(scheme, v, a, d, still)
+                iteration, before = 0, np.inf
+            begun, fields = (iteration, before, aged), (carried, still, values)
+            status, iteration, before, aged = newton(
+                x, d, begun, waiting, scheme, test, fields, system, share, solver
+            )
+            if status != DONE:
+                return status, Progress(step, iteration, done, before, aged, status == WANTS_FACTOR)
+            finish(scheme, x, v, a, d)
+            step, done, waiting = step + 1, done + iteration, False
+        return DONE, Progress(step, 0, done, before, aged, False)
+
+    return march
