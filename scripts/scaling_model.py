@@ -15,8 +15,11 @@ from typing import Any
 
 import numpy as np
 
-MULTIGRID_FROM = 120_000  # degrees of freedom
-EXCHANGES, SUMS = 1, 3  # of conjugate gradients with incomplete factors, an iteration
+EXCHANGES, SUMS = (
+    1,
+    4,
+)  # of conjugate gradients with two levels, an iteration: the fourth sum is over the parts
+TWO_LEVEL_RANKS = 64  # beyond them multigrid takes over
 SMOOTHING = 6  # exchanges of a multigrid cycle on every level
 COARSENING = 8  # degrees of freedom of a level over those of the next
 BYTES = 24  # of a node's values
@@ -39,9 +42,13 @@ class Parts:
 
 
 class Model:
-    """Fitted to the results of `ancf bench`: a run on two ranks, the set-up, scaling/*."""
+    """Fitted to the results of `ancf bench`: a run on two ranks, the set-up, scaling/*.
 
-    def __init__(self, results: dict[str, Any], run: str) -> None:
+    multigrid: what the run's linear solver was.
+    """
+
+    def __init__(self, results: dict[str, Any], run: str, *, multigrid: bool) -> None:
+        self.multigrid = multigrid
         facts = results[run]["facts"]
         self.elements, self.dof = facts["elements"], facts["dof"]
         self.iterations = facts["iterations"]["linear"]
@@ -88,7 +95,7 @@ class Model:
             return Parts(1, elements, self.serial * elements, shared, 0.0, 0.0)
         neighbours = min(ranks - 1, self.neighbour_limit * (1 - ranks ** (-1 / 3)))
         ghosts = self.ghost_factor * (nodes / ranks) ** (2 / 3)
-        levels = max(1.0, log(3 * nodes) / log(COARSENING)) if 3 * nodes > MULTIGRID_FROM else 0.0
+        levels = max(1.0, log(3 * nodes) / log(COARSENING)) if self.multigrid else 0.0
         exchanges = EXCHANGES + SMOOTHING * levels
         message = neighbours * self.latency + ghosts * BYTES / self.bandwidth
         return Parts(

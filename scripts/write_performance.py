@@ -2,7 +2,7 @@
 """Writes docs/performance.md and its charts from docs/benchmarks/*.json. All numbers in it come from there.
 
     ancf bench --json docs/benchmarks/bench.json                            # 20 minutes on two quiet cores
-    ancf bench accuracy stroke scaling --json docs/benchmarks/sweeps.json
+    ancf bench accuracy stroke iterations scaling --json docs/benchmarks/sweeps.json
     scripts/bench_peers.py --json docs/benchmarks/peers.json
     scripts/write_performance.py
 
@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from performance_charts import best_forces, draw_accuracy, draw_strokes, sweep
-from scaling_model import Model
+from scaling_model import TWO_LEVEL_RANKS, Model
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 STORE = DOCS / "benchmarks"
@@ -41,7 +41,7 @@ def main() -> int:
         return 2
     results = {**bench["results"], **sweeps.get("results", {})}
     pieces = [*head(bench), *targets(bench["results"]), *misses(bench["results"])]
-    pieces += [*side_by_side(peers), *charts(results), *scaling(results)]
+    pieces += [*side_by_side(peers), *charts(results), *solvers(results), *scaling(results)]
     (DOCS / "performance.md").write_text("\n".join(pieces) + "\n")
     print(DOCS / "performance.md")
     return 0
@@ -219,6 +219,27 @@ def cannot(name: str, found: Report) -> bool:
     return name.startswith("accuracy/") and "problem" in found
 
 
+def solvers(results: Report) -> list[str]:
+    """Iterations of the two solvers for large bodies."""
+    found = sweep(results, "iterations")
+    pairs = [
+        (element, size, run, found.get(("two_level", element, size)))
+        for (kind, element, size), run in found.items()
+        if kind == "gamg"
+    ]
+    if not pairs:
+        return []
+    rows = [
+        (element, run["facts"]["dof"], run["median"], last(run["facts"]["seconds"]))
+        + (other["median"], last(other["facts"]["seconds"]))
+        for element, _, run, other in pairs
+        if other
+    ]
+    heads = ("element", "dof", "multigrid, iterations", "s", "two levels, iterations", "s")
+    words = "Conjugate gradients to eight digits, tangent and set-up included, on a clamped beam bent far by a force at its end, one rank."
+    return ["## Linear solvers", "", words, "", *table(heads, rows)]
+
+
 def scaling(results: Report) -> list[str]:
     """One rank and two, and the model of many."""
     strong = [
@@ -236,14 +257,18 @@ def scaling(results: Report) -> list[str]:
     lines = (
         ["## Scaling", "", *table(("problem", "one rank, s", "two ranks, s", "", ""), rows)] if rows else []
     )
-    needed = ("setup_480k", "scaling/exchange", "scaling/messages/16", "block_480k")
+    needed = ("setup_480k", "scaling/exchange", "scaling/messages/16", "block_480k", "scaling/multigrid/480k")
     if not both(results, *needed):
         return lines
-    model = Model(results, "block_480k")
-    lines += ["### What to expect on more ranks", "", *model_words(model)]
+    model = Model(results, "block_480k", multigrid=False)
+    many = Model(results, "scaling/multigrid/480k", multigrid=True)
+    lines += ["### What to expect on more ranks", "", *model_words(model, many)]
     shares = [(f"{model.elements} elements", model.elements, 0), ("240,000 elements a rank", 0, 240_000)]
     for title, fixed, each in shares:
-        parts = [model.parts(fixed or each * ranks, ranks) for ranks in MANY]
+        parts = [
+            (model if ranks <= TWO_LEVEL_RANKS else many).parts(fixed or each * ranks, ranks)
+            for ranks in MANY
+        ]
         rows = [
             (p.ranks, p.serial, p.shared, p.messages, p.sums, p.total, efficiency(parts[0], p)) for p in parts
         ]
@@ -269,15 +294,16 @@ def efficiency(one: Any, many: Any) -> float:
     return (many.elements / many.total / many.ranks) / (one.elements / one.total)
 
 
-def model_words(model: Model) -> list[str]:
+def model_words(model: Model, many: Model) -> list[str]:
     words = f"""\
 A model (`scripts/scaling_model.py`), no measurement. Work and linear iterations ({model.iterations}) are
-those of `block_480k` on two ranks, {1e6 * model.work:.3g} us an element; reading and tables by the root rank take
-{1e6 * model.serial:.3g} us an element; ghosts {model.ghost_factor:.3g} (nodes / rank)^(2/3) and up to
+those of `block_480k` on two ranks, {1e6 * model.work:.3g} us an element; beyond {TWO_LEVEL_RANKS} ranks, where multigrid takes over,
+those of the same run with multigrid, {many.iterations} iterations and {1e6 * many.work:.3g} us an element. Reading and tables by the
+root rank take {1e6 * model.serial:.3g} us an element; ghosts {model.ghost_factor:.3g} (nodes / rank)^(2/3) and up to
 {model.neighbour_limit:.3g} neighbours, fitted to a mesh divided among 2 to 16 ranks. Messages of
 {1e6 * model.latency:.3g} us and {model.bandwidth / 1e9:.3g} GB/s and sums of {1e6 * model.sum_time:.3g} us
 were timed between two processes of this machine: a cluster's network has its own. Iterations are taken not to
-grow."""
+grow. What the root rank does alone is what limits many ranks: it reads the file and makes the tables."""
     return [words, ""]
 
 

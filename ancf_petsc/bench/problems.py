@@ -26,6 +26,7 @@ def block(
     tolerance: float = 1e-8,
     ramp: str = "linear",
     smallest_step: float = 1e-4,
+    petsc: dict[str, object] | None = None,
 ) -> dict[str, Any]:
     """A quarter block between bonded plates, pressed by `stroke`; forces are those of the quarter."""
     return {
@@ -40,6 +41,7 @@ def block(
         ],
         "statics": {"steps": steps, "tolerance": tolerance, "smallest_step": smallest_step},
         "output": {"curve": {"force": "top.z", "stroke": "top.z"}},
+        "petsc": petsc or {},
     }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ancf_petsc.bench.row import CUBE_74K, Row, press
+from ancf_petsc.bench.row import BLOCK_480K, CUBE_74K, FORCE_480K, Row, press
 
 STROKES = {"pvc_block": 0.025, "cube": 0.015}
 ACCURACY = {
@@ -92,6 +92,18 @@ def _scaling() -> list[Row]:
         )
         for name, (mesh, ranks, stroke) in weak.items()
     ]
+    multigrid = {"ksp_type": "cg", "pc_type": "gamg"}
+    rows.append(
+        Row(
+            "scaling/multigrid/480k",
+            "the block of 478,059 elements with multigrid",
+            "run",
+            press(BLOCK_480K | {"petsc": multigrid}, FORCE_480K),
+            allowed=1e-6,
+            ranks=2,
+            repetitions=1,
+        )
+    )
     rows += [
         Row(
             f"scaling/messages/{ranks}",
