@@ -236,7 +236,7 @@ def solvers(results: Report) -> list[str]:
         if other
     ]
     heads = ("element", "dof", "multigrid, iterations", "s", "two levels, iterations", "s")
-    words = "Conjugate gradients to eight digits, tangent and set-up included, on a clamped beam bent far by a force at its end, one rank."
+    words = "Conjugate gradients to eight digits with the tangent of a clamped beam bent far; seconds with set-up, one rank."
     return ["## Linear solvers", "", words, "", *table(heads, rows)]
 
 
@@ -297,9 +297,9 @@ def efficiency(one: Any, many: Any) -> float:
 def model_words(model: Model, many: Model) -> list[str]:
     words = f"""\
 A model (`scripts/scaling_model.py`), no measurement. Work and linear iterations ({model.iterations}) are
-those of `block_480k` on two ranks, {1e6 * model.work:.3g} us an element; beyond {TWO_LEVEL_RANKS} ranks, where multigrid takes over,
-those of the same run with multigrid, {many.iterations} iterations and {1e6 * many.work:.3g} us an element. Reading and tables by the
-root rank take {1e6 * model.serial:.3g} us an element; ghosts {model.ghost_factor:.3g} (nodes / rank)^(2/3) and up to
+those of `block_480k` on two ranks, {1e6 * model.work:.3g} us an element; beyond {TWO_LEVEL_RANKS} ranks, where
+multigrid takes over, those of the same run with multigrid, {many.iterations} iterations and
+{1e6 * many.work:.3g} us an element. Reading and tables by the root rank take {1e6 * model.serial:.3g} us an element; ghosts {model.ghost_factor:.3g} (nodes / rank)^(2/3) and up to
 {model.neighbour_limit:.3g} neighbours, fitted to a mesh divided among 2 to 16 ranks. Messages of
 {1e6 * model.latency:.3g} us and {model.bandwidth / 1e9:.3g} GB/s and sums of {1e6 * model.sum_time:.3g} us
 were timed between two processes of this machine: a cluster's network has its own. Iterations are taken not to
