@@ -299,7 +299,8 @@ def model_words(model: Model, many: Model) -> list[str]:
 A model (`scripts/scaling_model.py`), no measurement. Work and linear iterations ({model.iterations}) are
 those of `block_480k` on two ranks, {1e6 * model.work:.3g} us an element; beyond {TWO_LEVEL_RANKS} ranks, where
 multigrid takes over, those of the same run with multigrid, {many.iterations} iterations and
-{1e6 * many.work:.3g} us an element. Reading and tables by the root rank take {1e6 * model.serial:.3g} us an element; ghosts {model.ghost_factor:.3g} (nodes / rank)^(2/3) and up to
+{1e6 * many.work:.3g} us an element. Reading and tables by the root rank take
+{1e6 * model.serial:.3g} us an element; ghosts {model.ghost_factor:.3g} (nodes / rank)^(2/3) and up to
 {model.neighbour_limit:.3g} neighbours, fitted to a mesh divided among 2 to 16 ranks. Messages of
 {1e6 * model.latency:.3g} us and {model.bandwidth / 1e9:.3g} GB/s and sums of {1e6 * model.sum_time:.3g} us
 were timed between two processes of this machine: a cluster's network has its own. Iterations are taken not to
