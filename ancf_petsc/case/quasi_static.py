@@ -96,6 +96,6 @@ class QuasiStaticRun:
             shown,
             step.newton,
             step.linear,
-            self.assembly.smallest_det(x),
+            self.record.row["min_det_F"] if step.s == self._written else self.assembly.smallest_det(x),
             step.size,
         )

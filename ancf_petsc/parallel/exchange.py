@@ -17,7 +17,14 @@ T = TypeVar("T")
 
 def combined(comm: MPI.Comm, value: T, op: MPI.Op = MPI.SUM) -> T:
     """The sum (or what `op` says) of the values of all ranks: numbers or arrays. One rank's costs nothing."""
-    return value if comm.size == 1 else comm.allreduce(value, op)
+    if comm.size == 1:
+        return value
+    given = np.array(value)
+    if given.dtype != float:
+        return comm.allreduce(value, op)
+    total = np.empty_like(given)
+    comm.Allreduce(given, total, op)
+    return total if given.ndim else type(value)(total)  # type: ignore[call-arg, return-value]
 
 
 def on_root(comm: MPI.Comm, work: Callable[[], T]) -> T | None:

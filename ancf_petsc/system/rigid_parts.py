@@ -13,6 +13,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ancf_petsc.kernel.coarse import add_coarse_matrix, add_motion, restrict
+from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.system.assembly import Assembly
 from ancf_petsc.system.half import HalfMatrix
 
@@ -27,11 +28,11 @@ class RigidParts:
     def __init__(self, assembly: Assembly) -> None:
         self.assembly, model = assembly, assembly.model
         comm, own, slots = model.comm, model.own_positions, model.slots
-        total = comm.allreduce(len(own))
+        total = combined(comm, len(own))
         wanted = min(MOST_PARTS, DENSITY * sqrt(total)) * len(own) / total
         mine = min(max(1, round(wanted)), len(own))
         before = int(comm.scan(mine) - mine)
-        self.count = int(comm.allreduce(mine))
+        self.count = int(combined(comm, mine))
         labels = np.zeros(model.owned)
         labels[own] = before + bisected(model.reference[own], mine)
         labels = labels[np.arange(model.owned) - slots[: model.owned]]
@@ -48,14 +49,13 @@ class RigidParts:
         model, comm = self.assembly.model, self.assembly.comm
         own = model.own_positions
         sums = [np.bincount(self._part[own], positions[own, i], self.count) for i in range(3)]
-        sums.append(np.bincount(self._part[own], minlength=self.count))
-        sums = comm.allreduce(np.array(sums), MPI.SUM)
-        centres = (sums[:3] / sums[3]).T
+        counts = np.bincount(self._part[own], minlength=self.count)
+        total = combined(comm, np.array([*sums, counts], float))
+        centres = (total[:3] / total[3]).T
         self._arms[:] = (positions - self._shifts[:, None] * centres[self._part]) / model.size
         stiffness = np.zeros((6 * self.count, 6 * self.count))
         add_coarse_matrix(matrix.half, matrix.ghosts, *self._motions, stiffness)
-        comm.Allreduce(MPI.IN_PLACE, stiffness)
-        self._inverse[:] = inverse(stiffness)
+        self._inverse[:] = inverse(combined(comm, stiffness))
 
     def add_correction(self, r: Floats, z: Floats) -> None:
         """Add to z (n, 3) the motions that forces r (n, 3) make of the parts."""
