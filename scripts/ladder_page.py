@@ -77,7 +77,7 @@ def draw(problem: str, report: Report, path: Path) -> None:
     axes[1].axvline(QUICK, color="k", lw=0.8, ls=":")
     axes[0].set_ylabel("error, %")
     axes[0].plot([], [], "*", color="grey", ms=11, label="graded meshes")
-    axes[0].legend(fontsize=9)
+    axes[0].legend(fontsize=9, loc="lower left")
     figure.suptitle(TITLES[problem])
     figure.tight_layout()
     figure.savefig(path, dpi=110)
