@@ -8,14 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from ancf_petsc.bench.catalog import ROWS, choose
+from ancf_petsc.bench.elements import compile_catalogue
 from ancf_petsc.bench.meshes import mesh_path
 from ancf_petsc.bench.problems import stretched_force
 from ancf_petsc.bench.row import Row
 from ancf_petsc.bench.suite import judged, launch
 from ancf_petsc.bench.yardstick import gather_scatter
 from ancf_petsc.cli import main
+from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.errors import CaseError
 from ancf_petsc.launcher import environment, on_ranks
 from ancf_petsc.mesh.read import read_mesh
@@ -129,6 +132,33 @@ def test_kernels_are_checked_against_uniaxial_strain(measure):
     assert min(found["samples"]) > 0
     assert found["error"] < 1e-11  # rounding of 96 cells' forces
     assert found["facts"]["elements"] == 96
+
+
+@pytest.mark.parametrize("code", ["3413", "3843", "2432", "1222"])
+@pytest.mark.parametrize("kernel", ["residual", "tangent"])
+def test_a_quadrature_point_is_timed_and_checked(code, kernel):
+    row = ROWS[f"points/svk/{code}/{kernel}"]
+    found = launch(row.measure, {**row.task, "repetitions": 2})
+    assert min(found["samples"]) > 0
+    assert found["facts"]["points"] == ELEMENTS[code].points["default"]
+    # A central difference with steps of 1e-4; the tangent and its product differ by rounding.
+    assert found["error"] <= row.allowed
+
+
+def test_every_element_has_its_rows_of_points():
+    for code in ELEMENTS:
+        assert {f"points/svk/{code}/residual", f"points/svk/{code}/tangent"} <= set(ROWS)
+
+
+def test_compiling_starts_from_an_empty_folder(tmp_path, monkeypatch):
+    """One plain kernel instead of all: the process is timed, and what it compiles is not kept."""
+    monkeypatch.setattr(
+        "ancf_petsc.bench.elements.COMPILING",
+        "import os; assert not os.listdir(os.environ['ANCF_CACHE_DIR'])",
+    )
+    found = compile_catalogue(MPI.COMM_SELF, repetitions=2)
+    assert len(found["samples"]) == 2
+    assert ROWS["compile_catalogue"].target == 90
 
 
 def test_a_run_is_timed_and_checked_on_two_ranks():

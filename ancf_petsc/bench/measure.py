@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from ancf_petsc.bench.elements import compile_catalogue, points
 from ancf_petsc.bench.kernels import residual, tangent
 from ancf_petsc.bench.meshes import mesh_path
 from ancf_petsc.bench.messages import exchange_cost, messages
@@ -220,6 +221,8 @@ MEASUREMENTS: dict[str, Callable[..., Result]] = {
     "yardstick": yardstick,
     "residual": residual,
     "tangent": tangent,
+    "compile_catalogue": compile_catalogue,
+    "points": points,
     "set_up": set_up,
     "run": run,
     "explicit": explicit,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ancf_petsc.bench.row import BLOCK_480K, CUBE_74K, FORCE_480K, Row, press
+from ancf_petsc.element.catalog import ELEMENTS
 
 STROKES = {"pvc_block": 0.025, "cube": 0.015}
 ACCURACY = {
@@ -147,4 +148,24 @@ def _iterations() -> list[Row]:
     ]
 
 
-SWEEPS = [*_accuracy(), *_strokes(), *_iterations(), *_scaling()]
+def _points() -> list[Row]:
+    """What a quadrature point of every element costs; beams have a law of their own."""
+    return [
+        Row(
+            f"points/{law}/{code}/{kernel}",
+            f"{kernel} of {code}, {row.points['default']} points a cell, one core",
+            "points",
+            {"code": code, "kernel": kernel, "law": law},
+            unit="ns/point",
+            allowed=1e-6 if kernel == "residual" else 1e-11,
+            repetitions=20,
+            small=True,
+        )
+        for law in ("svk", "neo_hooke")
+        for code, row in ELEMENTS.items()
+        if law == "svk" or not row.is_beam
+        for kernel in ("residual", "tangent")
+    ]
+
+
+SWEEPS = [*_points(), *_accuracy(), *_strokes(), *_iterations(), *_scaling()]

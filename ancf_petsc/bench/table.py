@@ -56,6 +56,13 @@ KERNELS = [
         small=True,
     ),
     Row(
+        "compile_catalogue",
+        "compiling all kernels of all elements, both laws, into an empty folder",
+        "compile_catalogue",
+        target=90,
+        repetitions=1,
+    ),
+    Row(
         "setup_480k",
         "mesh file to first assembled tangent, 478,059 elements, 2 ranks",
         "set_up",

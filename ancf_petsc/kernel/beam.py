@@ -154,7 +154,7 @@ def tangent(
                             factor = w * D[q, a, k] * D[q, b, m]
                             for ij in range(9):
                                 rows[b, ij] += factor * H[q, k, m, ij // 3, ij % 3]
-            add_rows(values, rows, a, cells[e], starts[e], strides, split, driven)
+            add_rows(values, rows.ravel(), a, cells[e], starts[e], strides, split, driven)
 
 
 @kernel

@@ -8,6 +8,7 @@ at a point, G (a, 3) those with respect to X for the nodal vectors. A (3 J, 3 L,
 
 from __future__ import annotations
 
+import numpy as np
 from numba.extending import register_jitable
 
 from ancf_petsc.kernel.tet3413 import add_block
@@ -97,36 +98,54 @@ def cartesian_gradients(dN, slot, J, inverse, G):
 
 
 @register_jitable
-def combine(x, a, y, b, z, c):
-    """x a + y b + z c of nine numbers each."""
-    return add(scale(x, a), add(scale(y, b), scale(z, c)))
+def stress_changes(A, G, H):
+    """A_iJkL G_bL into H (3 J, 9 b + ik)."""
+    for b in range(G.shape[0]):
+        x, y, z = G[b, 0], G[b, 1], G[b, 2]
+        for J in range(3):
+            for ik in range(9):
+                H[J, 9 * b + ik] = x * A[J, 0, ik] + y * A[J, 1, ik] + z * A[J, 2, ik]
 
 
 @register_jitable
-def add_products(A, G, a, first, rows):
-    """Add sum_JL A_iJkL G_aJ G_bL to rows (b, 9 ik), for b from `first` on."""
-    x, y, z = G[a, 0], G[a, 1], G[a, 2]
-    along_x = combine(x, nine(A[0, 0]), y, nine(A[1, 0]), z, nine(A[2, 0]))
-    along_y = combine(x, nine(A[0, 1]), y, nine(A[1, 1]), z, nine(A[2, 1]))
-    along_z = combine(x, nine(A[0, 2]), y, nine(A[1, 2]), z, nine(A[2, 2]))
-    for b in range(first, G.shape[0]):
-        block = combine(G[b, 0], along_x, G[b, 1], along_y, G[b, 2], along_z)
-        for ik in range(9):
-            rows[b, ik] += block[ik]
+def add_products(H, G, first, rows):
+    """Add sum_J G_aJ H_J to rows (a, 9 b + ik), for b from a on where first is 1, for all b where it is 0.
+
+    The inner loop runs along memory and fills the registers of vectors.
+    """
+    for a in range(G.shape[0]):
+        x, y, z, start = G[a, 0], G[a, 1], G[a, 2], 9 * a * first
+        along_x, along_y, along_z, row = H[0, start:], H[1, start:], H[2, start:], rows[a, start:]
+        for m in range(row.size):
+            row[m] += x * along_x[m] + y * along_y[m] + z * along_z[m]
+
+
+@register_jitable
+def add_free_block(values, start, stride, block):
+    """`add_block` where nothing is driven and the row is this rank's."""
+    for i in range(3):
+        row = np.uint64(start + i * stride)
+        for j in range(3):
+            values[row + np.uint64(j)] += block[3 * i + j]
 
 
 @register_jitable
 def add_rows(values, rows, a, nodes, starts, strides, split, driven):
-    """Add rows (b, 9), the blocks of a and b from a on, and what mirrors them to a matrix stored by rows."""
+    """Add rows (9 b + ik), the blocks of a and b from a on, and what mirrors them to a matrix stored by rows."""
     i = nodes[a]
     for b in range(a, nodes.size):
-        j, block = nodes[b], nine(rows[b])
-        start = starts[a, b]
-        add_block(values, start, strides[i, 1 if start >= split else 0], block, driven[i], driven[j])
-        if b > a:
-            start = starts[b, a]
-            stride = strides[j, 1 if start >= split else 0]
-            add_block(values, start, stride, transpose(block), driven[j], driven[i])
+        j, block = nodes[b], nine(rows[9 * b : 9 * b + 9])
+        start, mirrored = starts[a, b], starts[b, a]
+        stride = strides[i, 1 if start >= split else 0]
+        stride_mirrored = strides[j, 1 if mirrored >= split else 0]
+        if start >= 0 and mirrored >= 0 and driven[i] == 0 and driven[j] == 0:
+            add_free_block(values, start, stride, block)
+            if b > a:
+                add_free_block(values, mirrored, stride_mirrored, transpose(block))
+        else:
+            add_block(values, start, stride, block, driven[i], driven[j])
+            if b > a:
+                add_block(values, mirrored, stride_mirrored, transpose(block), driven[j], driven[i])
 
 
 @register_jitable

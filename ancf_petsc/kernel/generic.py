@@ -27,6 +27,7 @@ from ancf_petsc.kernel.cell import (
     gradient_of,
     nine,
     scatter,
+    stress_changes,
     unit,
 )
 from ancf_petsc.kernel.compiled import kernel
@@ -132,21 +133,21 @@ def _tangent(law: Law) -> Callable:
         starts (e, a, a), strides (v, 2), split, driven (v,): as for element 3413.
         """
         gradients, weights, slot, base = reference
-        n, points = slot.size, weights.size
-        local, rows = np.empty((n, 3)), np.empty((n, 9))
-        A, G = np.empty((points, 3, 3, 9)), np.empty((points, n, 3))
+        n = slot.size
+        local, G, rows = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 9 * n))
+        A, H = np.empty((3, 3, 9)), np.empty((3, 9 * n))
         for e in range(first, last):
             J, inverse = maps.jacobians[e], nine(maps.inverses[e].ravel())
             gather(positions, cells[e], slot, J, local)
-            for q in range(points):
+            rows[:] = 0.0
+            for q in range(weights.size):
                 F = gradient_of(local, gradients[q], inverse, base)
-                moduli(F, parameters, weights[q] * volumes[e], A[q])
-                cartesian_gradients(gradients[q], slot, J, inverse, G[q])
+                moduli(F, parameters, weights[q] * volumes[e], A)
+                cartesian_gradients(gradients[q], slot, J, inverse, G)
+                stress_changes(A, G, H)
+                add_products(H, G, 1, rows)
             for a in range(n):
-                rows[:] = 0.0
-                for q in range(points):
-                    add_products(A[q], G[q], a, a, rows)
-                add_rows(values, rows, a, cells[e], starts[e], strides, split, driven)
+                add_rows(values, rows[a], a, cells[e], starts[e], strides, split, driven)
 
     return tangent
 

@@ -154,7 +154,7 @@ def tangent(
                         for b in range(n):
                             for ij in range(9):
                                 rows[b, ij] += factor * G[q, b, m] * H[q, k, m, ij // 3, ij % 3]
-            add_row(values, rows, a, cells[e], starts[e], strides, split, driven)
+            add_row(values, rows.ravel(), a, cells[e], starts[e], strides, split, driven)
 
 
 @cache

@@ -16,6 +16,7 @@ from ancf_petsc.kernel.cell import (
     gradient_of,
     nine,
     scatter,
+    stress_changes,
     unit,
 )
 from ancf_petsc.kernel.compiled import kernel
@@ -60,12 +61,12 @@ def _force(law: Law) -> Callable:
 
 @register_jitable
 def add_row(values, rows, a, nodes, starts, strides, split, driven):
-    """Add rows (b, 9), the blocks of a and all b, to a matrix stored by rows."""
+    """Add rows (9 b + ik), the blocks of a and all b, to a matrix stored by rows."""
     i = nodes[a]
     for b in range(nodes.size):
         start = starts[a, b]
         stride = strides[i, 1 if start >= split else 0]
-        add_block(values, start, stride, nine(rows[b]), driven[i], driven[nodes[b]])
+        add_block(values, start, stride, nine(rows[9 * b : 9 * b + 9]), driven[i], driven[nodes[b]])
 
 
 def _tangent(law: Law) -> Callable:
@@ -91,26 +92,26 @@ def _tangent(law: Law) -> Callable:
     ):
         """Add dforce/dr1, which is not symmetric, to values; starts, strides, split, driven as in `tet3413`."""
         gradients, weights, slot, base = reference
-        n, points = slot.size, weights.size
-        before, after, rows = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 9))
-        A, G = np.empty((points, 3, 3, 9)), np.empty((points, n, 3))
+        n = slot.size
+        before, after, G = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3))
+        A, H, rows = np.empty((3, 3, 9)), np.empty((3, 9 * n)), np.empty((n, 9 * n))
         for e in range(first, last):
             J, inverse = maps.jacobians[e], nine(maps.inverses[e].ravel())
             gather(positions_0, cells[e], slot, J, before)
             gather(positions_1, cells[e], slot, J, after)
-            for q in range(points):
+            rows[:] = 0.0
+            for q in range(weights.size):
                 F0 = gradient_of(before, gradients[q], inverse, base)
                 F1 = gradient_of(after, gradients[q], inverse, base)
                 for K in range(3):
                     for L in range(3):
                         block = scale(weights[q] * volumes[e], block_of(F0, F1, unit(K), unit(L), parameters))
                         for ik in range(9):
-                            A[q, K, L, ik] = block[ik]
-                cartesian_gradients(gradients[q], slot, J, inverse, G[q])
+                            A[K, L, ik] = block[ik]
+                cartesian_gradients(gradients[q], slot, J, inverse, G)
+                stress_changes(A, G, H)
+                add_products(H, G, 0, rows)
             for a in range(n):
-                rows[:] = 0.0
-                for q in range(points):
-                    add_products(A[q], G[q], a, 0, rows)
-                add_row(values, rows, a, cells[e], starts[e], strides, split, driven)
+                add_row(values, rows[a], a, cells[e], starts[e], strides, split, driven)
 
     return tangent

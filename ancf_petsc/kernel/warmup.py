@@ -35,7 +35,7 @@ def compile_kernels(
     """
     n, d = element.functions, element.cell.dimension
     cells = np.arange(n, dtype=np.int32).reshape(1, n)
-    positions = _one_cell(element)
+    positions = one_cell(element)
     pointers, columns = neighbours(cells, n, n)
     starts = block_starts(cells, n, pointers, columns, pointers, columns, 3)
     strides, driven, values = np.full((n, 2), 3 * n, np.int32), np.zeros(n, np.uint8), np.zeros(9 * n * n)
@@ -60,7 +60,7 @@ def compile_kernels(
     _compile_blocks(pointers, columns, values)
 
 
-def _one_cell(element: Element) -> NDArray[np.float64]:
+def one_cell(element: Element) -> NDArray[np.float64]:
     """Nodal vectors (a, 3) of the reference cell."""
     d = element.cell.dimension
     positions = np.zeros((element.functions, 3))
