@@ -126,6 +126,10 @@ def add_block(values, start, stride, block, driven_row, driven_column):
     """
     if start < 0:
         return
+    held = (driven_row | driven_column) & 7
+    if held == 0:
+        add_rows(values, start, stride, block)
+        return
     for i in range(3):
         for j in range(3):
             if not (driven_row >> i | driven_column >> j) & 1:
@@ -133,20 +137,33 @@ def add_block(values, start, stride, block, driven_row, driven_column):
 
 
 @register_jitable
+def add_pair(values, starts, strides, split, driven, nodes, a, b, block):
+    """Add the block of nodes a and b, which may be another rank's or driven."""
+    i, j, start = nodes[a], nodes[b], starts[a, b]
+    add_block(values, start, strides[i, 1 if start >= split else 0], block, driven[i], driven[j])
+
+
+@register_jitable
 def add_any_cell(values, starts, strides, split, driven, nodes, upper):
     """Add a cell with driven degrees of freedom or nodes of other ranks. upper: blocks (a, b) with a <= b."""
-    k = 0
-    for a in range(4):
-        i = nodes[a]
-        for b in range(a, 4):
-            j = nodes[b]
-            start = starts[a, b]
-            add_block(values, start, strides[i, 1 if start >= split else 0], upper[k], driven[i], driven[j])
-            if a != b:
-                start = starts[b, a]
-                stride = strides[j, 1 if start >= split else 0]
-                add_block(values, start, stride, transpose(upper[k]), driven[j], driven[i])
-            k += 1
+    k00, k01, k02, k03, k11, k12, k13, k22, k23, k33 = upper
+    matrix = (values, starts, strides, split, driven, nodes)
+    add_pair(*matrix, 0, 0, k00)
+    add_pair(*matrix, 0, 1, k01)
+    add_pair(*matrix, 0, 2, k02)
+    add_pair(*matrix, 0, 3, k03)
+    add_pair(*matrix, 1, 0, transpose(k01))
+    add_pair(*matrix, 1, 1, k11)
+    add_pair(*matrix, 1, 2, k12)
+    add_pair(*matrix, 1, 3, k13)
+    add_pair(*matrix, 2, 0, transpose(k02))
+    add_pair(*matrix, 2, 1, transpose(k12))
+    add_pair(*matrix, 2, 2, k22)
+    add_pair(*matrix, 2, 3, k23)
+    add_pair(*matrix, 3, 0, transpose(k03))
+    add_pair(*matrix, 3, 1, transpose(k13))
+    add_pair(*matrix, 3, 2, transpose(k23))
+    add_pair(*matrix, 3, 3, k33)
 
 
 @cache
