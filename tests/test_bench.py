@@ -232,7 +232,7 @@ def _measured() -> dict:
 
 def test_the_model_finds_the_laws_it_was_fitted_to_and_the_run_it_was_scaled_by(project, monkeypatch):
     monkeypatch.syspath_prepend(str(project / "scripts"))
-    model = __import__("scaling_model").Model(_measured(), "block_480k")
+    model = __import__("scaling_model").Model(_measured(), "block_480k", multigrid=False)
     monkeypatch.delitem(sys.modules, "scaling_model")
     assert model.ghost_factor == pytest.approx(3)
     assert model.neighbour_limit == pytest.approx(12)

@@ -23,6 +23,7 @@ from ancf_petsc.system.rigid import rigid_motions
 DIRECT_LIMIT, CURVED_LIMIT = 300, 5_000
 TWO_LEVEL_LIMIT, MOST_RANKS = 3_000_000, 64
 SMALL = 3_000
+CHEAP_TO_FACTOR = 30_000
 TIRED = 1.5
 GAMG_THRESHOLD = 0.01  # drops weak couplings from the aggregates: fewer iterations with slopes and mid-nodes
 
@@ -147,6 +148,11 @@ class LinearSolver:
         matrix.setNearNullSpace(rigid)
         for item in (rigid, *vectors):
             item.destroy()
+
+    @property
+    def is_cheap_to_factor(self) -> bool:
+        """Whether factoring is tried at once where an iterative method fails; else shorter steps are tried first."""
+        return self.dof <= CHEAP_TO_FACTOR
 
     def gave_up(self) -> bool:
         """Whether an iterative method failed where a factorisation would go on."""

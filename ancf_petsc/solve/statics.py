@@ -71,6 +71,7 @@ class LoadPath:
 
     def _advance(self) -> None:
         """One accepted step, after as many halvings as it takes."""
+        linear = self.newton.linear
         while True:
             target = self._target()
             trial, outcome = self._attempt(target)
@@ -78,6 +79,10 @@ class LoadPath:
                 break
             trial.destroy()
             size = (target - self.s) / 2
+            if linear.gave_up() and (linear.is_cheap_to_factor or size < self.smallest_step):
+                log.info("  the tangent is not positive definite: factoring from now on")
+                linear.fall_back_to_direct()
+                continue
             if size < self.smallest_step:
                 raise NoEquilibrium(
                     why_it_ends(self.newton, self.x, self.s, outcome.reason, self.smallest_step)
@@ -106,12 +111,7 @@ class LoadPath:
         trial = self.x.copy()
         self.newton.predict(trial, self.s, target)
         self._note_slope(trial, target)
-        outcome = self.newton.solve(target, trial)
-        if not outcome.converged and self.newton.linear.gave_up():
-            log.info("  the tangent is not positive definite: factoring from now on")
-            self.newton.linear.fall_back_to_direct()
-            return self._attempt(target)
-        return trial, outcome
+        return trial, self.newton.solve(target, trial)
 
     def _extrapolated(self, target: float) -> PETSc.Vec | None:
         """The polynomial through the last states; None where it turns cells inside out."""
