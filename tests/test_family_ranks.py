@@ -80,7 +80,7 @@ def names(folder):
 
 def test_one_two_and_three_ranks_give_the_same_numbers(names, folder, mpirun):
     for ranks in (1, 2, 3):
-        mpirun(ranks, [folder / "runner.py", folder / "cases.json", folder / f"on{ranks}"])
+        mpirun(ranks, [folder / "runner.py", folder / "cases.json", folder / f"on{ranks}"], timeout=300)
     for name in names:
         one, *others = (open_results(folder / f"on{ranks}" / name) for ranks in (1, 2, 3))
         for other in others:
