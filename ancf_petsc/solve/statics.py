@@ -101,9 +101,10 @@ class LoadPath:
         return mark if parts <= 1 else self.s + (mark - self.s) / parts
 
     def _attempt(self, target: float) -> tuple[PETSc.Vec, Outcome]:
-        """Newton from a predicted state; where extrapolation predicts badly, from the tangent's."""
-        trial = self._extrapolated(target)
+        """Newton from a predicted state; where extrapolation predicts badly, or cells inside out, from the tangent's."""
+        trial = self._past.at(target)
         if trial is not None:
+            self.assembly.set_driven(trial, target)
             outcome = self.newton.solve(target, trial)
             if outcome.converged:
                 return trial, outcome
@@ -112,17 +113,6 @@ class LoadPath:
         self.newton.predict(trial, self.s, target)
         self._note_slope(trial, target)
         return trial, self.newton.solve(target, trial)
-
-    def _extrapolated(self, target: float) -> PETSc.Vec | None:
-        """The polynomial through the last states; None where it turns cells inside out."""
-        trial = self._past.at(target)
-        if trial is None:
-            return None
-        self.assembly.set_driven(trial, target)
-        if self.assembly.smallest_det(trial) > 0.0:
-            return trial
-        trial.destroy()
-        return None
 
     def _note_slope(self, predicted: PETSc.Vec, target: float) -> None:
         """The slope of the path where it begins: the tangent's where ramps are straight, none where they start flat."""
