@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Writes docs/performance.md and its charts from docs/benchmarks/*.json. All numbers in it come from there.
 
-    ancf bench --json docs/benchmarks/bench.json                            # 20 minutes on two quiet cores
-    ancf bench accuracy stroke iterations scaling --json docs/benchmarks/sweeps.json
+    ancf bench --json docs/benchmarks/bench.json                            # 5 minutes on two quiet cores
+    ancf bench accuracy stroke iterations scaling --json docs/benchmarks/sweeps.json    # 20 minutes
     scripts/bench_peers.py --json docs/benchmarks/peers.json
     scripts/write_performance.py
 
