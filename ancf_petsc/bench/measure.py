@@ -72,7 +72,8 @@ def run(
     for _ in range(repetitions):
         result = _solved(comm, case)
         samples.append(sum(result["seconds"].get(part, 0.0) for part in parts))
-        memory = max(memory, result["memory_bytes_an_element"])  # later runs find memory that is not given back
+        # Later runs find memory that earlier ones have not given back.
+        memory = max(memory, result["memory_bytes_an_element"])
     result["memory_bytes_an_element"] = memory
     return {
         "samples": samples,
