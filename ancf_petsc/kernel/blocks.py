@@ -27,9 +27,8 @@ from ancf_petsc.material.tensor import (
     transpose,
 )
 
-SMALLEST_PIVOT = (
-    1e-3  # determinant of a pivot over that of the block it was: less is not clear of single precision
-)
+SMALLEST_PIVOT = 1e-3
+"""Determinant of a pivot over that of the block it was: less is not clear of single precision."""
 
 
 @inlined
