@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 from numba.extending import register_jitable
 
-from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.kernel.compiled import composed, kernel
 
 STEPS = np.array(
     [
@@ -95,7 +95,7 @@ def size_of(left, proposed):
 def leap_kernel(rates: Callable) -> Callable:
     """From where the body is to a goal, by steps of the pair."""
 
-    @register_jitable
+    @composed
     def attempt(y, h, tolerances, system, flat, stages, trial):
         """The stages of a step h, the state it ends with in trial (2, n, 3); returns its error."""
         for i in range(1, 7):

@@ -14,7 +14,6 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
-from numba.extending import register_jitable
 
 from ancf_petsc.kernel.cell import (
     ZERO,
@@ -30,7 +29,7 @@ from ancf_petsc.kernel.cell import (
     stress_changes,
     unit,
 )
-from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.kernel.compiled import composed, kernel
 from ancf_petsc.kernel.tet3413 import Kernels
 from ancf_petsc.material.models import Law, green_lagrange
 from ancf_petsc.material.tensor import add, determinant, dot, scale, transpose
@@ -95,7 +94,7 @@ def _energy(law: Law) -> Callable:
 def _moduli(law: Law) -> Callable:
     block_of = law.tangent
 
-    @register_jitable
+    @composed
     def moduli(F, parameters, weight, A):
         """weight dP_iJ/dF_kL into A (3 J, 3 L, 9 ik)."""
         for J in range(3):

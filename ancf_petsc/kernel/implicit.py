@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
-from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.kernel.compiled import composed, kernel
 from ancf_petsc.kernel.envelope import solve_one
 
 DONE, WANTS_FACTOR, FAILED = range(3)
@@ -104,7 +104,7 @@ def norm(x):
 def newton_of(unbalance: Callable) -> Callable:
     """Newton's iterations of a step, to stand in the loop over steps."""
 
-    @register_jitable
+    @composed
     def evaluate(scheme, x, d, carried, still, system, share, values):
         """The balance of the step in values (n, 3), 0 where driven, and its norm and that of the forces."""
         h, am, af, beta, gamma, damping = scheme
@@ -117,7 +117,7 @@ def newton_of(unbalance: Callable) -> Callable:
                 values[i, c] = values[i, c] / af if share[i, c] != 0.0 else 0.0
         return norm(values), scale
 
-    @register_jitable
+    @composed
     def newton(x, d, begun, waiting, scheme, test, fields, system, share, solver):
         """Iterations on d until it balances or a factor is wanted. begun: iterations, last norm, whether aged.
 

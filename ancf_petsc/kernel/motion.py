@@ -22,7 +22,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from ancf_petsc.kernel.adaptive import leap_kernel
-from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.kernel.compiled import composed, kernel
 from ancf_petsc.kernel.envelope import solve_components
 from ancf_petsc.kernel.implicit import alpha_kernel
 from ancf_petsc.kernel.tet3413 import edge_sum, nodes_of, scatter_force
@@ -124,7 +124,7 @@ def make_motion_kernels(law: Law) -> MotionKernels:
 def balance_of(stress: Callable) -> Callable:
     """The loop over forces, to stand in others."""
 
-    @register_jitable
+    @composed
     def balance(x, body, factors, patterns, force):
         """force (n, 3): loads less internal forces."""
         cells, gradients, volumes, parameters = body
@@ -142,7 +142,7 @@ def balance_of(stress: Callable) -> Callable:
 def rates_of(balance: Callable) -> Callable:
     """Rates of change, to stand in others."""
 
-    @register_jitable
+    @composed
     def rates(y, damping, body, factors, patterns, mass, force, work, f):
         """f = dy/dt of y = (x, v), both (2, n, 3): velocities and accelerations, 0 where driven."""
         balance(y[0], body, factors, patterns, force)
@@ -182,7 +182,7 @@ def march_kernel(balance: Callable) -> Callable:
 def unbalance_of(balance: Callable) -> Callable:
     """The balance of an implicit step, to stand in others."""
 
-    @register_jitable
+    @composed
     def unbalance(x, d, part, carried, body, factors, patterns, graph, force, values):
         """values (n, 3): M carried + Q(x + part d) - Q_e. Returns the sum of the squares of the three."""
         pointers, columns, masses = graph
