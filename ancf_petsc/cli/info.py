@@ -60,7 +60,9 @@ def execute(arguments: argparse.Namespace) -> int:
         show_table(list(rows[0]), [list(row.values()) for row in rows])
         return 0
     _print_versions()
-    return 0 if arguments.no_check or _self_check() else 4
+    if arguments.no_check:
+        return 0
+    return 0 if all([_check_machine_code(), _self_check()]) else 4
 
 
 def _print_versions() -> None:
@@ -74,6 +76,29 @@ def _print_versions() -> None:
     show_facts(
         [*versions().items(), ("petsc packages", ", ".join(there)), ("compiled kernels", str(CACHE_FOLDER))],
     )
+
+
+def _check_machine_code() -> bool:
+    """Compare the machine code in the cache with the same functions run by Python; clear the cache if one differs."""
+    from ancf_petsc.kernel.selfcheck import wrong_kernels
+    from ancf_petsc.kernel.warmup import clear_cache, compiled_sets
+
+    wrong, names, begun = set[str](), set[str](), time.perf_counter()
+    for element, laws, mean, moving in compiled_sets():
+        wrong.update(wrong_kernels(element, laws, mean=mean, moving=moving))
+        names.update(law.name for law in laws)
+    if wrong:
+        clear_cache()
+        print(
+            f"machine code in the cache: WRONG: {', '.join(sorted(wrong))}; the cache is cleared, repeat runs made with it"
+        )
+        return False
+    seconds = time.perf_counter() - begun
+    words = (
+        f"good: equals its source for {', '.join(sorted(names))}, {seconds:.1f} s" if names else "none yet"
+    )
+    print(f"machine code in the cache: {words}")
+    return True
 
 
 def _self_check() -> bool:
