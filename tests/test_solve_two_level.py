@@ -9,11 +9,11 @@ import pytest
 from bodies import assembly_of, odd_mesh, random_state
 from petsc4py import PETSc
 
-from ancf_petsc.kernel.blocks import factorise, solve_factors, upper_pattern
-from ancf_petsc.kernel.coarse import add_motion, restrict
-from ancf_petsc.solve.two_level import TwoLevel
-from ancf_petsc.system.half import HalfMatrix
-from ancf_petsc.system.rigid_parts import RigidParts, bisected, inverse
+from ancf_petsc.algebra.blocks import factorise, solve_factors, upper_pattern
+from ancf_petsc.algebra.coarse import add_motion, restrict
+from ancf_petsc.solve.linear.half import HalfMatrix
+from ancf_petsc.solve.linear.rigid_parts import RigidParts, bisected, inverse
+from ancf_petsc.solve.linear.two_level import TwoLevel
 
 SINGLE = 1e-5  # what single precision leaves of a preconditioner, some rounding added up
 
@@ -22,9 +22,9 @@ import json, sys
 import numpy as np
 from mpi4py import MPI
 from ancf_petsc import case_from_dict
-from ancf_petsc.case.build import build
+from ancf_petsc.analysis.build import build
 from ancf_petsc.solve.newton import Newton
-from ancf_petsc.system.assembly import Assembly
+from ancf_petsc.model.assembly import Assembly
 comm = MPI.COMM_WORLD
 case = case_from_dict(json.loads(sys.argv[1]), ".")
 newton = Newton(Assembly(build(case, comm).model), 1e-8)

@@ -8,14 +8,14 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ancf_petsc.analysis.build import build_from
 from ancf_petsc.bench.problems import HEIGHT, block, stretched_force
 from ancf_petsc.bench.yardstick import timed
-from ancf_petsc.case.blueprint import draw
-from ancf_petsc.case.build import build_from
-from ancf_petsc.case.load import case_from_dict
+from ancf_petsc.input.load import case_from_dict
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.model.measures import reaction
 from ancf_petsc.parallel.exchange import on_root
-from ancf_petsc.system.assembly import Assembly
-from ancf_petsc.system.measures import reaction
+from ancf_petsc.plan.plan import draw
 
 STRETCH = 0.9
 

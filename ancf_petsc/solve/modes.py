@@ -10,8 +10,8 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from ancf_petsc.errors import AncfError
-from ancf_petsc.system.assembly import Assembly
-from ancf_petsc.system.mass import Mass
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.model.mass import Mass
 
 TOLERANCE = 1e-10
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.forcing import Forcing
-from ancf_petsc.solve.linear import LinearSolver
+from ancf_petsc.solve.linear.solver import LinearSolver
 from ancf_petsc.solve.petsc import default_options
-from ancf_petsc.system.assembly import Assembly
 
 MOST_ITERATIONS = 25
 PREDICTOR_TERM = 1e-8  # the path's slope is made of it, and extrapolated from

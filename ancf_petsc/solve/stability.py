@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from ancf_petsc.solve.linear import negative_pivots_of
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.solve.linear.solver import negative_pivots_of
 from ancf_petsc.solve.newton import Newton
-from ancf_petsc.system.assembly import Assembly
 
 SVK_LIMIT = 1.0 / np.sqrt(3.0)
 LARGEST_TO_FACTOR = 300_000
