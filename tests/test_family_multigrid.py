@@ -23,12 +23,12 @@ def iterations(code, divisions, folder):
     assembly = Assembly(build(case, MPI.COMM_SELF).model)
     matrix, ksp = assembly.create_matrix(), PETSc.KSP().create(MPI.COMM_SELF)
     with petsc_options(MULTIGRID):
-        solver = LinearSolver(assembly, ksp)
+        solver = LinearSolver(assembly, matrix, ksp)
         solver.read_options()
     solver.ask_for(1e-8)
     x, load, step = assembly.reference_vector(), assembly.vector(), assembly.vector()
     assembly.tangent(x, matrix)
-    solver.renew_if_tired(matrix, x)
+    solver.renew_if_tired(x)
     load.array[:] = assembly.external_force(1.0).ravel()
     load.array[assembly.driven] = 0.0
     ksp.solve(load, step)

@@ -19,6 +19,8 @@ from ancf_petsc.solve.load_path import LoadPath
 from ancf_petsc.solve.newton import Newton
 
 STATIC_TOLERANCE, SMALLEST_STEP = 1e-9, 1e-3
+RIGID = 1e-9
+"""Of the scale of omega squared: what is below is a rigid motion."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,7 @@ def damping_of(case: Case, assembly: Assembly, mass: Mass) -> Damping:
 
     modes = modes_at(assembly, mass, x, number)
     x.destroy()
-    rigid = 1e-9 * assembly.largest_diagonal / max(assembly.comm.allgather(mass.diagonal.max(initial=0.0)))
-    if len(modes.omega_squared) < number or modes.omega_squared[number - 1] <= rigid:
+    if len(modes.omega_squared) < number or modes.omega_squared[number - 1] <= RIGID * modes.scale:
         raise _refused(case, f"mode {number} of {state} does not vibrate: it is a rigid motion or unstable")
     omega = sqrt(modes.omega_squared[number - 1])
     return Damping(2 * omega, f"= 4 pi / T, critical for mode {number} of {state}: T = {2 * pi / omega:.6g}")

@@ -13,6 +13,7 @@ from ancf_petsc.bench.problems import HEIGHT, block, stretched_force
 from ancf_petsc.bench.yardstick import timed
 from ancf_petsc.input.load import case_from_dict
 from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.model.measures import reaction
 from ancf_petsc.parallel.exchange import on_root
 from ancf_petsc.plan.plan import draw
@@ -78,12 +79,12 @@ def _derivative_error(assembly: Assembly, x: PETSc.Vec) -> float:
     return abs(grown / stretched_force(STRETCH)[1] - 1)
 
 
-def _product_error(assembly: Assembly, x: PETSc.Vec, matrix: PETSc.Mat) -> float:
+def _product_error(assembly: Assembly, x: PETSc.Vec, matrix: Matrix) -> float:
     direction, product = assembly.reference_vector(), assembly.vector()
     direction.array[:] = np.sin(direction.array_r * (40 / HEIGHT))
     direction.array[assembly.driven] = 0.0
     assembly.tangent(x, matrix)
-    matrix.mult(direction, product)
+    matrix.mat.mult(direction, product)
     expected = assembly.vector()
     expected.array[:] = assembly.tangent_product(x, direction).ravel()
     expected.array[assembly.driven] = 0.0

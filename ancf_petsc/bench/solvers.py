@@ -45,7 +45,7 @@ def iterations(comm: MPI.Comm, *, mesh: str, element: str, solver: str, repetiti
         seconds.append(time.perf_counter() - begun)
         counts.append(ksp.getIterationNumber())
     rest = rhs.duplicate()
-    newton.matrix.mult(found, rest)
+    newton.matrix.mat.mult(found, rest)
     rest.axpy(-1.0, rhs)
     facts = {"dof": assembly.model.dof, "seconds": seconds, "solver": newton.linear.describe()}
     error = rest.norm() / rhs.norm()

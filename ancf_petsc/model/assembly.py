@@ -1,37 +1,21 @@
-"""Forces and tangents of a model in PETSc's vectors and matrices.
+"""Forces, energies and tangents of a model at states x, PETSc vectors of the owned nodal vectors.
 
-Rows are complete where they are owned, so only ghost positions travel. The tangent is written straight into the arrays of
-the matrix, with rows and columns of driven degrees of freedom left out and one number on their diagonal.
+Rows are complete where they are owned, so only ghost positions travel.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ancf_petsc.algebra.graph import block_starts, neighbours
-from ancf_petsc.kernel.constant import add_mass_blocks
+from ancf_petsc.algebra.graph import neighbours
+from ancf_petsc.model.matrix import Layout, Matrix
 from ancf_petsc.model.model import Model
 from ancf_petsc.parallel.exchange import combined
-
-
-class Rows(NamedTuple):
-    """Where the matrix's values lie: by scalar rows, own columns first, from `split` on those of ghosts.
-
-    pointers (n + 1,) and columns of 3 x 3 blocks in the rows of the n owned nodal vectors; columns are local.
-    """
-
-    own_pointers: NDArray[np.int64]
-    own_columns: NDArray[np.int32]
-    other_pointers: NDArray[np.int64]
-    other_columns: NDArray[np.int32]
-    split: int
 
 
 class Assembly:
@@ -40,12 +24,10 @@ class Assembly:
     def __init__(self, model: Model) -> None:
         self.model = model
         self.comm = model.comm
-        self.largest_diagonal = 0.0
         n = model.owned
         self._positions = model.reference.copy()
         self._second = model.reference.copy()
         self._force = np.zeros_like(model.reference)
-        self._driven_bits = model.driven_bits()
         self.driven = np.flatnonzero(model.motion[:n] >= 0)
         self.driven_motion = model.motion[:n].ravel()[self.driven]
         self._ghosts = self._ghost_scatter()
@@ -172,134 +154,40 @@ class Assembly:
             )
         return strain, cauchy, det
 
-    # --- the matrix
+    # --- matrices
 
-    def create_matrix(self, *, symmetric: bool = True) -> PETSc.Mat:
-        """A matrix that shares its arrays with `tangent`; zero, all blocks of cells present."""
-        n = self.model.owned
-        pointers, columns = self.graph
-        rows = np.repeat(np.arange(n), np.diff(pointers))
-        own = columns < n
-        parts = []
-        for inside in (own, ~own):
-            counts = np.bincount(rows[inside], minlength=n)
-            parts.append((np.concatenate(([0], np.cumsum(counts))), columns[inside]))
-        self.rows = Rows(*parts[0], *parts[1], split=9 * int(own.sum()))
-        own_counts, other_counts = np.diff(self.rows.own_pointers), np.diff(self.rows.other_pointers)
-        self._starts = block_starts(self.model.cells, n, *self.rows[:4], 3)
-        self._strides = np.zeros((len(self.model.reference), 2), np.int32)
-        self._strides[:n, 0], self._strides[:n, 1] = 3 * own_counts, 3 * other_counts
-        self.values = np.zeros(9 * len(columns))  # of the matrix made last
-        self._diagonal = self._diagonal_places()
-        matrix = self._share()
-        matrix.setBlockSize(3)  # petsc4py leaves it out where arrays are shared
-        if symmetric:
-            matrix.setOption(PETSc.Mat.Option.SYMMETRIC, flag=True)
-            matrix.setOption(PETSc.Mat.Option.SYMMETRY_ETERNAL, flag=True)
-        return matrix
+    @cached_property
+    def layout(self) -> Layout:
+        """Where the numbers of this body's matrices lie."""
+        return Layout(self.model, self.graph)
 
-    def tangent(self, x: PETSc.Vec, matrix: PETSc.Mat, add: Callable[[], None] | None = None) -> None:
-        """Fill the matrix with the tangent at x, and what `add` adds to it (`add_mass`)."""
-        positions, values = self.local(x), self.values
-        values[:] = 0.0
+    def create_matrix(self, *, symmetric: bool = True) -> Matrix:
+        """A matrix for tangents and masses, zero."""
+        return Matrix(self.layout, symmetric=symmetric)
+
+    def tangent(self, x: PETSc.Vec, matrix: Matrix) -> None:
+        """Make the matrix the tangent at x. Collective."""
+        matrix.clear()
+        self.add_tangent(x, matrix)
+        matrix.finish()
+
+    def add_tangent(self, x: PETSc.Vec, matrix: Matrix) -> None:
+        """Add the tangent at x to a matrix that is not finished yet. Collective."""
+        positions = self.local(x)
         for region in self.model.regions:
             region.kernels.tangent(
-                positions,
-                *self.model.tables,
-                region.parameters,
-                region.first,
-                region.last,
-                self._starts,
-                self._strides,
-                self.rows.split,
-                self._driven_bits,
-                values,
+                positions, *self.model.tables, region.parameters, region.first, region.last, *matrix.target
             )
-        if add is not None:
-            add()
-        self._finish(matrix)
 
-    def mean_tangent(
-        self, x0: PETSc.Vec, x1: PETSc.Vec, matrix: PETSc.Mat, add: Callable[[], None] | None = None
-    ) -> None:
-        """Fill the matrix with the derivative of `mean_force` with respect to x1, and what `add` adds to it."""
+    def add_mean_tangent(self, x0: PETSc.Vec, x1: PETSc.Vec, matrix: Matrix) -> None:
+        """Add the derivative of `mean_force` with respect to x1 to a matrix that is not finished yet. Collective."""
         before, after = self._two_states(x0, x1)
-        self.values[:] = 0.0
         for region in self.model.regions:
             assert region.mean_kernels is not None
-            region.mean_kernels.tangent(
-                before,
-                after,
-                *self.model.tables,
-                region.parameters,
-                region.first,
-                region.last,
-                self._starts,
-                self._strides,
-                self.rows.split,
-                self._driven_bits,
-                self.values,
-            )
-        if add is not None:
-            add()
-        self._finish(matrix)
+            given = (*self.model.tables, region.parameters, region.first, region.last)
+            region.mean_kernels.tangent(before, after, *given, *matrix.target)
 
-    def add_mass(self, mass: NDArray, factor: float) -> None:
-        """Add factor times a mass, one number per entry of the graph, to the matrix that is being filled."""
-        add_mass_blocks(
-            *self.graph,
-            mass,
-            factor,
-            self.rows.own_pointers,
-            self.rows.other_pointers,
-            self.rows.split,
-            self._driven_bits,
-            self.values,
-        )
-
-    def fill_mass(self, matrix: PETSc.Mat, mass: NDArray) -> None:
-        """Fill the matrix with a mass; driven degrees of freedom get none."""
-        self.values[:] = 0.0
-        self.add_mass(mass, 1.0)
-        matrix.stateIncrease()
-        matrix.assemble()
-
-    def _finish(self, matrix: PETSc.Mat) -> None:
-        """One number on the diagonal of all driven degrees of freedom: the mean of the others."""
-        values = self.values
-        diagonal = values[self._diagonal]
-        free = np.ones(len(diagonal), bool)
-        free[self.driven] = False
-        total, count, largest = diagonal[free].sum(), free.sum(), np.abs(diagonal[free]).max(initial=0.0)
-        total, count = combined(self.comm, np.array([total, count]))
-        self.largest_diagonal = combined(self.comm, largest, MPI.MAX)
-        values[self._diagonal[self.driven]] = (
-            total / count if count and total > 0.0 else self.largest_diagonal or 1.0
-        )
-        matrix.stateIncrease()
-        matrix.assemble()
-
-    def _share(self) -> PETSc.Mat:
-        """PETSc's matrix on this object's array of values."""
-        rows, n, total = self.rows, 3 * self.model.owned, combined(self.comm, 3 * self.model.owned)
-        own = (*_scalar_rows(rows.own_pointers, rows.own_columns), self.values[: rows.split])
-        sizes = ((n, total), (n, total))
-        if self.comm.size == 1:
-            return PETSc.Mat().createAIJWithArrays(sizes, own, comm=self.comm)
-        numbers = self.model.ghost_numbers[rows.other_columns - self.model.owned]
-        other = (*_scalar_rows(rows.other_pointers, numbers), self.values[rows.split :])
-        return PETSc.Mat().createAIJWithArrays(sizes, (own, other), comm=self.comm)
-
-    def _diagonal_places(self) -> NDArray:
-        """Where the diagonal of each owned degree of freedom lies in the values."""
-        pointers, columns = self.rows.own_pointers, self.rows.own_columns
-        n = self.model.owned
-        counts = np.diff(pointers)
-        rows = np.repeat(np.arange(n), counts)
-        slot = np.flatnonzero(columns == rows) - pointers[:-1]
-        component = np.arange(3)
-        start = 9 * pointers[:-1] + 3 * slot
-        return (start[:, None] + component * (3 * counts[:, None] + 1)).ravel()
+    # --- ghosts
 
     def _ghost_scatter(self):
         """PETSc's scatter to the ghosts, the vector it fills and one to fill it from; None on one rank."""
@@ -311,16 +199,3 @@ class Assembly:
         x = self.vector()
         scatter = PETSc.Scatter().create(x, source, ghosts, None)
         return scatter, ghosts, x
-
-
-def _scalar_rows(pointers: NDArray, columns: NDArray) -> tuple[NDArray, NDArray]:
-    """Pointers and columns of the scalar rows of a matrix of 3 x 3 blocks, in PETSc's integers."""
-    counts = np.diff(pointers)
-    scalar_pointers = np.concatenate(([0], np.cumsum(np.repeat(3 * counts, 3))))
-    scalar = (3 * columns[:, None].astype(np.int64) + np.arange(3)).ravel()
-    starts = np.repeat(3 * pointers[:-1], 3)
-    lengths = np.repeat(3 * counts, 3)
-    within = np.arange(scalar_pointers[-1]) - np.repeat(scalar_pointers[:-1], lengths)
-    return scalar_pointers.astype(PETSc.IntType), scalar[np.repeat(starts, lengths) + within].astype(
-        PETSc.IntType
-    )

@@ -17,6 +17,7 @@ from ancf_petsc.element.element import Element
 from ancf_petsc.kernel.constant import add_mass, mass_product
 from ancf_petsc.kernel.tables import turn_functions
 from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.parallel.exchange import combined
 
 CHUNK = 1000
@@ -77,9 +78,9 @@ class Mass:
         mass_product(*self.assembly.graph, self.values, self.assembly.with_ghosts(field, self._field), result)
         return result
 
-    def add_to_matrix(self, factor: float) -> None:
-        """Add factor times the mass to the matrix the assembly is filling."""
-        self.assembly.add_mass(self.values, factor)
+    def add_to(self, matrix: Matrix, factor: float = 1.0) -> None:
+        """Add factor times the mass to a matrix that is not finished yet."""
+        matrix.add_mass(self.values, factor)
 
     def kinetic_energy(self, velocity: NDArray) -> float:
         """Kinetic energy of the whole body. Collective."""

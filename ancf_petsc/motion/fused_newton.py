@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from ancf_petsc.algebra.envelope import envelope, factorise
 from ancf_petsc.kernel.implicit import DONE, WANTS_FACTOR, Progress, Scheme, Test
@@ -22,19 +19,13 @@ MOST_ENTRIES = 200_000
 class FusedNewton:
     """Steps of generalised alpha for a body that `fits`, with the matrix and the tolerance of its IncrementSolver.
 
-    fill(d, matrix): puts the derivative of the balance there. aged: whether the factor is to be made anew.
+    aged: whether the factor is to be made anew.
     """
 
-    def __init__(
-        self,
-        fused: FusedMotion,
-        equations: Equations,
-        solver: IncrementSolver,
-        fill: Callable[[PETSc.Vec, PETSc.Mat], None],
-    ) -> None:
-        self.fused, self.equations, self.solver, self.fill = fused, equations, solver, fill
+    def __init__(self, fused: FusedMotion, equations: Equations, solver: IncrementSolver) -> None:
+        self.fused, self.equations, self.solver = fused, equations, solver
         self.aged = True
-        self._pointers, self._columns = solver.matrix.getRowIJ()
+        self._pointers, self._columns = solver.matrix.mat.getRowIJ()
         self._starts = envelope(self._pointers, self._columns)
         self._factor = np.zeros(self._starts[-1])
         self._free = equations.solver.free.ravel().copy()
@@ -44,7 +35,7 @@ class FusedNewton:
         """A body in compiled loops, small, and no option that speaks of PETSc's solvers."""
         if equations.fused is None or begins_a_given_option("ts_", "snes_", "ksp_", "pc_", "mat_"):
             return False
-        return envelope(*solver.matrix.getRowIJ())[-1] <= MOST_ENTRIES
+        return envelope(*solver.matrix.mat.getRowIJ())[-1] <= MOST_ENTRIES
 
     def steps(
         self, state: tuple[NDArray, NDArray, NDArray], times: NDArray, scheme: Scheme
@@ -56,7 +47,7 @@ class FusedNewton:
         d = self.solver.d.array.reshape(-1, 3)
         progress = Progress(0, 0, 0, np.inf, self.aged, False)
         while True:
-            rounding = ROUNDING * self.equations.assembly.largest_diagonal
+            rounding = ROUNDING * self.solver.matrix.largest_diagonal
             test = Test(self.solver.relative, 0.0, rounding, SLOW, MOST_ITERATIONS)
             factor = (self._starts, self._factor)
             status, progress = self.fused.implicit((*state, d), progress, times, scheme, test, factor)
@@ -69,6 +60,6 @@ class FusedNewton:
 
     def _renew(self) -> bool:
         """Factor at d; False where the matrix is not positive definite."""
-        self.fill(self.solver.d, self.solver.matrix)
-        values = self.equations.assembly.values
+        self.solver.fill(self.solver.d)
+        values = self.solver.matrix.values
         return factorise(self._starts, self._pointers, self._columns, values, self._free, self._factor)

@@ -34,7 +34,7 @@ def why_it_ends(newton: Newton, x: PETSc.Vec, s: float, reason: str, smallest_st
     pivots = None
     if assembly.model.dof <= LARGEST_TO_FACTOR:
         assembly.tangent(x, newton.matrix)
-        pivots = negative_pivots_of(newton.matrix)
+        pivots = negative_pivots_of(newton.matrix.mat)
     place = ", ".join(f"{c:.6g}" for c in centroid)
     line = (
         f"no equilibrium beyond pseudo-time {s:.6g}: steps of {smallest_step:g} still fail ({reason}); "

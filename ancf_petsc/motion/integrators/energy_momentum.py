@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.errors import CaseError
+from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.integrators.base import Settings
 from ancf_petsc.motion.integrators.increment import Forces
@@ -51,11 +52,9 @@ class EnergyMomentum(OneStep):
         self._reactions = values.ravel()[eq.assembly.driven]
         return Forces(values, self.squared(inertia, internal, loads))
 
-    def tangent(self, d: PETSc.Vec, matrix: PETSc.Mat) -> None:
-        factor, mass = 2 / self.h**2 + self.equations.damping / self.h, self.equations.mass
-        self.equations.assembly.mean_tangent(
-            self.x, self.between(d, 1.0), matrix, lambda: mass.add_to_matrix(factor)
-        )
+    def tangent(self, d: PETSc.Vec, matrix: Matrix) -> None:
+        self.equations.assembly.add_mean_tangent(self.x, self.between(d, 1.0), matrix)
+        self.equations.mass.add_to(matrix, 2 / self.h**2 + self.equations.damping / self.h)
 
     def finish(self, d: NDArray) -> tuple[float, float]:
         eq, v = self.equations, self.v.array_r.reshape(-1, 3)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.kernel.implicit import Scheme
+from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.fused_newton import FusedNewton
 from ancf_petsc.motion.integration import steps_in
@@ -37,7 +38,7 @@ class GeneralizedAlpha(OneStep):
         self._fused: FusedNewton | None = None
         fused = equations.fused
         if fused is not None and FusedNewton.fits(equations, self.solver):
-            self._fused = FusedNewton(fused, equations, self.solver, self.tangent)
+            self._fused = FusedNewton(fused, equations, self.solver)
         self.restart()
 
     @property
@@ -87,10 +88,10 @@ class GeneralizedAlpha(OneStep):
         inertia = self.alpha_m / (self.beta * self.h**2)
         return inertia + self.equations.damping * self.alpha_f * self.gamma / (self.beta * self.h)
 
-    def tangent(self, d: PETSc.Vec, matrix: PETSc.Mat) -> None:
-        part, mass = self.alpha_f, self.equations.mass
-        factor = self._inertia / part
-        self.equations.assembly.tangent(self.between(d, part), matrix, lambda: mass.add_to_matrix(factor))
+    def tangent(self, d: PETSc.Vec, matrix: Matrix) -> None:
+        part = self.alpha_f
+        self.equations.assembly.add_tangent(self.between(d, part), matrix)
+        self.equations.mass.add_to(matrix, self._inertia / part)
 
     def finish(self, d: NDArray) -> None:
         v1, self.a = self._ends(d)

@@ -40,7 +40,7 @@ class ImplicitFirstOrder(FirstOrder):
             (self.y.getSizes(),) * 2, self._eliminated, comm=equations.comm
         )
         self.jacobian.setUp()
-        self.test = ForceTest(equations, x)
+        self.test = ForceTest(self.matrix, x)
         self.ts.setType(self.type_name)
         self.ts.setIFunction(self._function, self.y.duplicate())
         self.ts.setIJacobian(self._derivative, self.jacobian)
@@ -64,7 +64,7 @@ class ImplicitFirstOrder(FirstOrder):
 
     def set_solver_up(self) -> None:
         self._fill(self.y, 0.0, 1.0 / self.ts.getTimeStep())
-        self._eliminated.set_operators()
+        self._eliminated.linear.set_operators()
         self._eliminated.ksp.setUp()
         self.ts.setUp()
         self.test.aged = True
@@ -102,9 +102,11 @@ class ImplicitFirstOrder(FirstOrder):
     def _fill(self, y: PETSc.Vec, t: float, shift: float) -> None:
         x, _ = self.stage(y, t)
         self._eliminated.shift = shift
-        factor, mass = shift * (shift + self.equations.damping), self.equations.mass
-        self.equations.assembly.tangent(x, self.matrix, lambda: mass.add_to_matrix(factor))
-        self._eliminated.linear.take(self.matrix, x)
+        self.matrix.clear()
+        self.equations.assembly.add_tangent(x, self.matrix)
+        self.equations.mass.add_to(self.matrix, shift * (shift + self.equations.damping))
+        self.matrix.finish()
+        self._eliminated.linear.take(x)
         self.test.aged = False
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
@@ -125,19 +127,16 @@ class _Eliminated:
         self.shift = 0.0
         assembly = owner.equations.assembly
         self.ksp = PETSc.KSP().create(assembly.comm)
-        self.linear = LinearSolver(assembly, self.ksp, moving=True)
+        self.linear = LinearSolver(assembly, owner.matrix, self.ksp, moving=True)
         self.ksp.setFromOptions()
         self._right, self._answer = assembly.vector(), assembly.vector()
-
-    def set_operators(self) -> None:
-        self.ksp.setOperators(self.linear.operator(self.owner.matrix), self.owner.matrix)
 
     def mult(self, A: PETSc.Mat, y: PETSc.Vec, f: PETSc.Vec) -> None:
         """The product, for Krylov methods an option may ask for."""
         n, dy = self.owner._own, y.array_r
         f.array[:n] = self.shift * dy[:n] - dy[n:]
         self._right.array[:] = dy[:n]
-        self.owner.matrix.mult(self._right, self._answer)
+        self.owner.matrix.mat.mult(self._right, self._answer)
         rest = (self.shift + self.owner.equations.damping) * (dy[n:] - self.shift * dy[:n])
         f.array[n:] = self._answer.array_r + self._free(self._mass(rest))
 
@@ -148,7 +147,7 @@ class _Eliminated:
         r[equations.assembly.driven] = 0.0
         right = s + (self.shift + equations.damping) * self._mass(r)
         self._right.array[:] = self._free(right)
-        self.set_operators()
+        self.linear.set_operators()
         self.ksp.solve(self._right, self._answer)
         dx = self._answer.array_r
         y.array[:n], y.array[n:] = dx, self.shift * dx - r

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.linear.solver import LinearSolver
@@ -45,8 +46,8 @@ class Forces:
 class ForceTest:
     """Convergence: out-of-balance force against the forces at work. Tells whether the matrix has aged."""
 
-    def __init__(self, equations: Equations, x: PETSc.Vec) -> None:
-        self.equations, self.x = equations, x
+    def __init__(self, matrix: Matrix, x: PETSc.Vec) -> None:
+        self.matrix, self.x = matrix, x
         self.scale = 0.0
         self.aged = True
         self._before = np.inf
@@ -63,8 +64,7 @@ class ForceTest:
         residual = norms[2]
         if not isfinite(residual):
             return Reason.DIVERGED_FNORM_NAN
-        comm = self.equations.comm
-        forces = sqrt(combined(comm, self.scale))
+        forces = sqrt(combined(self.matrix.comm, self.scale))
         relative, absolute = snes.getTolerances()[:2]
         if iteration:
             self.aged = self.aged or residual > SLOW * self._before
@@ -75,14 +75,14 @@ class ForceTest:
 
     def _rounding(self) -> float:
         """What the rounding of positions leaves of forces. Collective."""
-        return ROUNDING * self.equations.assembly.largest_diagonal * self.x.norm()
+        return ROUNDING * self.matrix.largest_diagonal * self.x.norm()
 
 
 class IncrementSolver:
     """Solves forces(d) = 0 on the free degrees of freedom; d carries the increments of the driven ones.
 
-    x: the state. forces(d) -> Forces. tangent(d, matrix) fills the matrix with the derivative. relative:
-    the tolerance.
+    x: the state. forces(d) -> Forces. tangent(d, matrix) adds the derivative to a matrix. relative: the
+    tolerance.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class IncrementSolver:
         equations: Equations,
         x: PETSc.Vec,
         forces: Callable[[PETSc.Vec], Forces],
-        tangent: Callable[[PETSc.Vec, PETSc.Mat], None],
+        tangent: Callable[[PETSc.Vec, Matrix], None],
         *,
         symmetric: bool,
         relative: float,
@@ -100,18 +100,18 @@ class IncrementSolver:
         self.forces, self.tangent, self.relative = forces, tangent, relative
         self.matrix = self.assembly.create_matrix(symmetric=symmetric)
         self.d = self.assembly.vector()
-        self.test = ForceTest(equations, x)
+        self.test = ForceTest(self.matrix, x)
         self.newton = self.linear_iterations = 0
         self._always_new = False
         self._residual = self.assembly.vector()
         self._quick = self._create("basic")
-        self.linear = LinearSolver(self.assembly, self._quick.getKSP(), moving=True, symmetric=symmetric)
+        self.linear = LinearSolver(self.assembly, self.matrix, self._quick.getKSP(), moving=True)
         with default_options({"snes_linesearch_type": "basic"}):
             self._quick.setFromOptions()
         self._careful = self._create("bt")
         self._careful.setKSP(self._quick.getKSP())
         for snes in (self._quick, self._careful):
-            snes.setJacobian(self._jacobian, self.linear.operator(self.matrix), self.matrix)
+            snes.setJacobian(self._jacobian, self.linear.operator, self.matrix.mat)
         with default_options({"snes_linesearch_type": "bt"}):
             self._careful.setFromOptions()
 
@@ -139,10 +139,16 @@ class IncrementSolver:
             self._always_new = False
         return None if reason > 0 else WORDS.get(reason, f"PETSc's reason {reason}")
 
+    def fill(self, d: PETSc.Vec) -> None:
+        """Make the matrix the derivative of the forces at d."""
+        self.matrix.clear()
+        self.tangent(d, self.matrix)
+        self.matrix.finish()
+
     def set_up(self) -> None:
         """Fill the matrix at d and set the linear solver up."""
-        self._jacobian(self._quick, self.d, self.linear.operator(self.matrix), self.matrix)
-        self.linear.ksp.setOperators(self.linear.operator(self.matrix), self.matrix)
+        self._jacobian(self._quick, self.d, self.linear.operator, self.matrix.mat)
+        self.linear.set_operators()
         self._quick.setUp()
         self.linear.ksp.setUp()
 
@@ -166,6 +172,6 @@ class IncrementSolver:
 
     def _jacobian(self, snes: PETSc.SNES, d: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
         if self.test.aged or self._always_new:
-            self.tangent(d, P)
-            self.linear.take(P, self.x)
+            self.fill(d)
+            self.linear.take(self.x)
             self.test.aged = False

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.integrators.base import Integrator, Settings, Step
 from ancf_petsc.motion.integrators.increment import Forces, IncrementSolver
@@ -55,8 +56,8 @@ class OneStep(Integrator):
         """Out-of-balance forces of the step at work for an increment."""
 
     @abstractmethod
-    def tangent(self, d: PETSc.Vec, matrix: PETSc.Mat) -> None:
-        """Fill the matrix with the derivative of `forces`."""
+    def tangent(self, d: PETSc.Vec, matrix: Matrix) -> None:
+        """Add the derivative of `forces` to a matrix that is not finished yet."""
 
     @abstractmethod
     def finish(self, d: NDArray) -> tuple[float, float] | None:

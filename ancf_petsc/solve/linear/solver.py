@@ -16,6 +16,7 @@ from math import log10
 from petsc4py import PETSc
 
 from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.solve.linear.rigid import rigid_motions
 from ancf_petsc.solve.linear.two_level import TwoLevel
 from ancf_petsc.solve.petsc import default_options, is_given
@@ -29,15 +30,12 @@ GAMG_THRESHOLD = 0.01  # drops weak couplings from the aggregates: fewer iterati
 
 
 class LinearSolver:
-    """Sets up a KSP for the tangents of one assembly. moving: with the mass in them."""
+    """Sets up a KSP for one matrix of an assembly. moving: with the mass in it."""
 
-    def __init__(
-        self, assembly: Assembly, ksp: PETSc.KSP, *, moving: bool = False, symmetric: bool = True
-    ) -> None:
-        self.assembly = assembly
+    def __init__(self, assembly: Assembly, matrix: Matrix, ksp: PETSc.KSP, *, moving: bool = False) -> None:
+        self.assembly, self.matrix = assembly, matrix
         self.ksp = ksp
         self.dof = assembly.model.dof
-        self.symmetric = symmetric
         self.small = moving and assembly.comm.size == 1 and self.dof <= SMALL
         chosen = is_given("ksp_type") or is_given("pc_type")
         limit = CURVED_LIMIT if assembly.model.element.is_curved else SMALL if moving else DIRECT_LIMIT
@@ -46,13 +44,14 @@ class LinearSolver:
         self._rate: float | None = None
         few = self.dof <= TWO_LEVEL_LIMIT and assembly.comm.size <= MOST_RANKS
         self._two_level = None
-        if symmetric and few and not (chosen or self.direct):
-            self._two_level = TwoLevel(assembly)
+        if matrix.symmetric and few and not (chosen or self.direct):
+            self._two_level = TwoLevel(assembly, matrix)
         self._configure()
 
-    def operator(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        """What conjugate gradients multiply with where the tangent is in `matrix`."""
-        return matrix if self._two_level is None else self._two_level.operator
+    @property
+    def operator(self) -> PETSc.Mat:
+        """What conjugate gradients multiply with."""
+        return self.matrix.mat if self._two_level is None else self._two_level.operator
 
     def destroy(self) -> None:
         """Free PETSc's objects; one with Python in it that is left to Python's end can crash it."""
@@ -65,14 +64,14 @@ class LinearSolver:
         pc = self.ksp.getPC()
         if self.direct:
             self.ksp.setType(PETSc.KSP.Type.PREONLY)
-            pc.setType(PETSc.PC.Type.CHOLESKY if self.symmetric else PETSc.PC.Type.LU)
+            pc.setType(PETSc.PC.Type.CHOLESKY if self.matrix.symmetric else PETSc.PC.Type.LU)
             pc.setFactorSolverType("petsc" if self.small else "mumps")
             if self.small:
                 pc.setFactorOrdering("qmd")
             return
-        self.ksp.setType(PETSc.KSP.Type.CG if self.symmetric else PETSc.KSP.Type.BCGS)
+        self.ksp.setType(PETSc.KSP.Type.CG if self.matrix.symmetric else PETSc.KSP.Type.BCGS)
         self.ksp.setTolerances(rtol=1e-8, max_it=1000)
-        if self.symmetric:
+        if self.matrix.symmetric:
             self.ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         if self._two_level is not None:
             pc.setType(PETSc.PC.Type.PYTHON)
@@ -101,12 +100,16 @@ class LinearSolver:
         if not self.direct and not is_given("ksp_rtol"):
             self.ksp.setTolerances(rtol=reduction)
 
-    def renew_if_tired(self, matrix: PETSc.Mat, x: PETSc.Vec) -> None:
+    def set_operators(self) -> None:
+        """Give the KSP its operator and the matrix that the preconditioner is made of."""
+        self.ksp.setOperators(self.operator, self.matrix.mat)
+
+    def renew_if_tired(self, x: PETSc.Vec) -> None:
         """Before a solve with a new tangent at x: factor it, or keep the preconditioner if its last solve was about
         as quick as its first.
         """
-        self.ksp.setOperators(self.operator(matrix), matrix)
-        self.take(matrix, x)
+        self.set_operators()
+        self.take(x)
         pc = self.ksp.getPC()
         tired = self._fresh_rate is None or self._rate is None or self._rate > TIRED * self._fresh_rate
         pc.setReusePreconditioner(not (tired or self.direct))
@@ -131,21 +134,21 @@ class LinearSolver:
         names = [self.ksp.getType(), kind] + ([package] if package else [])
         return f"{' + '.join(names)}, {self.dof} degrees of freedom"
 
-    def take(self, matrix: PETSc.Mat, x: PETSc.Vec) -> None:
-        """See a tangent filled at x. Collective."""
+    def take(self, x: PETSc.Vec) -> None:
+        """See the matrix, which was filled at x. Collective."""
         if self._two_level is not None and not self.direct:
             self._two_level.take(x)
         if self.ksp.getPC().getType() in ("gamg", "hypre", "ml", "bddc"):
-            self._tell_rigid_motions(matrix, x)
+            self._set_rigid_motions(x)
 
-    def _tell_rigid_motions(self, matrix: PETSc.Mat, x: PETSc.Vec) -> None:
+    def _set_rigid_motions(self, x: PETSc.Vec) -> None:
         """Give multigrid the rigid motions of the state x."""
         vectors = []
         for mode in rigid_motions(self.assembly.model, x.array_r.reshape(-1, 3)):
             vectors.append(self.assembly.vector())
             vectors[-1].array[:] = mode.ravel()
         rigid = PETSc.NullSpace().create(vectors=vectors, comm=self.assembly.comm)
-        matrix.setNearNullSpace(rigid)
+        self.matrix.mat.setNearNullSpace(rigid)
         for item in (rigid, *vectors):
             item.destroy()
 

@@ -11,16 +11,17 @@ from petsc4py import PETSc
 
 from ancf_petsc.algebra.blocks import factorise, solve_factors
 from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.solve.linear.half import HalfMatrix
 from ancf_petsc.solve.linear.rigid_parts import RigidParts
 
 
 class TwoLevel:
-    """The matrix of an assembly as PETSc's Mat `operator`, and a context for a PC of type python."""
+    """A matrix of an assembly as PETSc's Mat `operator`, and a context for a PC of type python."""
 
-    def __init__(self, assembly: Assembly) -> None:
+    def __init__(self, assembly: Assembly, matrix: Matrix) -> None:
         self.assembly = assembly
-        self._half = HalfMatrix(assembly)
+        self._half = HalfMatrix(assembly, matrix)
         self._parts = RigidParts(assembly)
         self._positions = assembly.model.reference.copy()
         columns, owned = self._half.half[1], assembly.model.owned
