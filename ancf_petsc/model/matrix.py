@@ -103,6 +103,10 @@ class Matrix:
         pointers = (rows.own_pointers, rows.other_pointers, rows.split)
         add_mass_blocks(*self.layout.graph, mass, factor, *pointers, self.layout.driven_bits, self.values)
 
+    def add_diagonal(self, diagonal: NDArray) -> None:
+        """Add numbers (3 n,) to the diagonal of the owned degrees of freedom."""
+        self.values[self.layout.diagonal] += diagonal
+
     def finish(self) -> None:
         """Put one number on the diagonal of all driven degrees of freedom, the mean of the others. Collective."""
         places, driven = self.layout.diagonal, self.layout.driven
