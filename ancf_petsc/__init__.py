@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from ancf_petsc.case.load import Case
+    from ancf_petsc.input.load import Case
     from ancf_petsc.results.reader import Results
 
 # Names are looked up when they are used: importing the package costs nothing.
 _HOMES = {
-    "Case": "ancf_petsc.case.load",
-    "load_case": "ancf_petsc.case.load",
-    "case_from_dict": "ancf_petsc.case.load",
+    "Case": "ancf_petsc.input.load",
+    "load_case": "ancf_petsc.input.load",
+    "case_from_dict": "ancf_petsc.input.load",
     "Results": "ancf_petsc.results.reader",
     "open_results": "ancf_petsc.results.reader",
     "AncfError": "ancf_petsc.errors",
@@ -40,7 +40,7 @@ def run(case: Case, folder: str | Path | None = None, *, force: bool = False) ->
     folder: where the results go, default results/NAME. force: overwrite a folder that holds something else.
     Raises CaseError, NoEquilibrium, Interrupted.
     """
-    from ancf_petsc.case.run import run_case
+    from ancf_petsc.analysis.run import run_case
     from ancf_petsc.results.reader import open_results
 
     return open_results(run_case(case, folder, force=force))

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ancf_petsc import load_case
-from ancf_petsc.case.run import run_case
+from ancf_petsc.analysis.run import run_case
 from ancf_petsc.errors import MotionStopped
 from ancf_petsc.mesh.generate import make_mesh
 from ancf_petsc.post.panels import COLOURS, GREY, draw_levels, panels, style

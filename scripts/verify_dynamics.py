@@ -15,9 +15,9 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 from family import fall_of_one_brick, reference_fall  # noqa: E402
 from motion_cases import GRAVITY, REFERENCE, Followed, pendulum, run_of, slope  # noqa: E402
 
-from ancf_petsc.case.load import load_case  # noqa: E402
-from ancf_petsc.case.run import run_case  # noqa: E402
-from ancf_petsc.case.vibration import find_modes  # noqa: E402
+from ancf_petsc.analysis.modes import find_modes  # noqa: E402
+from ancf_petsc.analysis.run import run_case  # noqa: E402
+from ancf_petsc.input.load import load_case  # noqa: E402
 from ancf_petsc.results.tables import read_table  # noqa: E402
 
 CASES = ROOT / "cases"

@@ -9,9 +9,9 @@ import numpy as np
 from mpi4py import MPI
 
 from ancf_petsc import case_from_dict
-from ancf_petsc.case.build import build
+from ancf_petsc.analysis.build import build
 from ancf_petsc.mesh.generate import make_mesh
-from ancf_petsc.system.assembly import Assembly
+from ancf_petsc.model.assembly import Assembly
 
 
 def odd_mesh(path: Path, seed: int = 0) -> Path:

@@ -10,12 +10,12 @@ import numpy as np
 from mpi4py import MPI
 
 from ancf_petsc import case_from_dict, run
-from ancf_petsc.case.build import build
+from ancf_petsc.analysis.build import build
 from ancf_petsc.element.catalog import ELEMENTS, element
 from ancf_petsc.element.shape import cartesian_values
 from ancf_petsc.mesh.generate import bricks, make_mesh
 from ancf_petsc.mesh.kinds import KUHN
-from ancf_petsc.system.assembly import Assembly
+from ancf_petsc.model.assembly import Assembly
 
 REFERENCE = Path(__file__).parent / "reference"
 SECTION = {"thickness": 0.1, "plane": "stress"}

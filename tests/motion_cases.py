@@ -14,11 +14,11 @@ import numpy as np
 from mpi4py import MPI
 
 from ancf_petsc import case_from_dict, load_case
-from ancf_petsc.case.build import build
-from ancf_petsc.case.motion import Motion
-from ancf_petsc.case.run import run_case
+from ancf_petsc.analysis.build import build
+from ancf_petsc.analysis.motion import Motion
+from ancf_petsc.analysis.run import run_case
 from ancf_petsc.errors import AncfError
-from ancf_petsc.solve.dynamics import TimeIntegration
+from ancf_petsc.motion.integration import TimeIntegration
 
 PROJECT = Path(__file__).resolve().parent.parent
 CASES = PROJECT / "cases"

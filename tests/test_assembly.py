@@ -50,11 +50,11 @@ def test_tangent_is_the_difference_quotient_of_the_residual(free):
     quotient = (forces[1] - forces[0]) / (2 * h)
     matrix, product = free.create_matrix(), free.vector()
     free.tangent(x, matrix)
-    matrix.mult(direction, product)
+    matrix.mat.mult(direction, product)
     scale = np.abs(quotient).max()
     np.testing.assert_allclose(product.array_r, quotient, atol=1e-7 * scale)
     np.testing.assert_allclose(free.tangent_product(x, direction).ravel(), quotient, atol=1e-7 * scale)
-    assert matrix.isSymmetric(1e-14 * scale)
+    assert matrix.mat.isSymmetric(1e-14 * scale)
 
 
 @each_law

@@ -8,9 +8,9 @@ from typing import get_args
 import pytest
 from pydantic import BaseModel
 
-from ancf_petsc.case import CaseSpec, case_from_dict
-from ancf_petsc.case.schema import LAWS
-from ancf_petsc.solve.methods import METHODS
+from ancf_petsc.input import CaseSpec, case_from_dict
+from ancf_petsc.input.methods import METHODS
+from ancf_petsc.input.schema import LAWS
 
 PAGE = (Path(__file__).parents[1] / "docs" / "case-format.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)

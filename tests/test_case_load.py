@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ancf_petsc.case import load_case, toml
-from ancf_petsc.case.overrides import petsc_table
 from ancf_petsc.errors import CaseError
+from ancf_petsc.input import load_case, toml
+from ancf_petsc.input.overrides import petsc_table
 
 TEXT = """\
 title = "block"
@@ -217,7 +217,7 @@ def test_what_is_written_reads_back_the_same(tables):
 
 def test_reading_a_case_imports_no_numerics():
     heavy = "{'numpy', 'numba', 'mpi4py', 'petsc4py', 'gmsh', 'rich'} & set(sys.modules)"
-    code = f"import sys, ancf_petsc.case.load, ancf_petsc.log, ancf_petsc.cli; print({heavy} or 'none')"
+    code = f"import sys, ancf_petsc.input.load, ancf_petsc.log, ancf_petsc.cli; print({heavy} or 'none')"
     assert (
         subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "none"
     )

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ancf_petsc.case import Case, CaseSpec, case_from_dict
-from ancf_petsc.case.schema import LAWS
 from ancf_petsc.errors import CaseError
-from ancf_petsc.solve.methods import METHODS
+from ancf_petsc.input import Case, CaseSpec, case_from_dict
+from ancf_petsc.input.methods import METHODS
+from ancf_petsc.input.schema import LAWS
 
 STATICS = {
     "title": "block",

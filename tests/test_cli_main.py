@@ -66,7 +66,7 @@ def test_help_lists_every_verb_and_is_quick():
 
 
 def test_help_imports_no_verb():
-    heavy = "{'numpy', 'pydantic', 'rich', 'mpi4py', 'ancf_petsc.case'}"
+    heavy = "{'numpy', 'pydantic', 'rich', 'mpi4py', 'ancf_petsc.input'}"
     code = f"import sys; from ancf_petsc.cli import main; main(['--help']); print({heavy} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.endswith("set()\n")

@@ -5,8 +5,8 @@ import re
 import pytest
 
 from ancf_petsc import cli
-from ancf_petsc.case import load_case
 from ancf_petsc.cli.new import KINDS
+from ancf_petsc.input import load_case
 from ancf_petsc.mesh.read import read_mesh
 
 
@@ -41,7 +41,7 @@ def test_what_is_commented_out_is_valid_too(kind):
 
 def test_the_bent_beam_rests_on_force_and_weight(here):
     """Equilibrium: the clamp carries 50 N and 0.01 m3 x 1000 kg/m3 x 9.81 m/s2 = 98.1 N."""
-    from ancf_petsc.case.run import run_case
+    from ancf_petsc.analysis.run import run_case
 
     cli.main(["new", "beam", "--kind", "bending"])
     folder = run_case(load_case("beam", ["statics.steps=2"]), here / "out")

@@ -19,9 +19,9 @@ from tiny_meshes import quadratic_bricks
 from ancf_petsc import case_from_dict, cli, load_case, run
 from ancf_petsc.element import catalog
 from ancf_petsc.element.element import Element
+from ancf_petsc.input import methods
 from ancf_petsc.material import models
 from ancf_petsc.mesh.generate import make_mesh
-from ancf_petsc.solve import methods
 
 
 def code_of(project, heading):

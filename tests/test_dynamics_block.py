@@ -8,7 +8,7 @@ from motion_cases import PROJECT
 from statics_cases import block
 
 from ancf_petsc import case_from_dict
-from ancf_petsc.case.run import run_case
+from ancf_petsc.analysis.run import run_case
 from ancf_petsc.results.tables import read_table
 
 

@@ -10,10 +10,10 @@ from family import mesh_of
 from motion_cases import GRAVITY, HINGE, PROJECT, REFERENCE, Followed, body, pendulum, slope
 
 from ancf_petsc import case_from_dict
-from ancf_petsc.case.run import run_case
+from ancf_petsc.analysis.run import run_case
 from ancf_petsc.errors import MotionStopped
+from ancf_petsc.motion.equations import Equations
 from ancf_petsc.results.tables import read_table
-from ancf_petsc.solve.equations import Equations
 
 METHOD = {"integrator": "central_difference"}
 RAMPED = {**GRAVITY, "ramp": "cosine"}

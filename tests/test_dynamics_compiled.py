@@ -8,13 +8,13 @@ from motion_cases import GRAVITY, HINGE, PROJECT, Followed, pendulum
 from mpi4py import MPI
 
 from ancf_petsc import case_from_dict
-from ancf_petsc.case.build import build
-from ancf_petsc.case.motion import Motion
-from ancf_petsc.case.run import run_case
+from ancf_petsc.analysis.build import build
+from ancf_petsc.analysis.motion import Motion
+from ancf_petsc.analysis.run import run_case
 from ancf_petsc.errors import MotionStopped
+from ancf_petsc.motion.equations import Equations
+from ancf_petsc.motion.fused_newton import FusedNewton
 from ancf_petsc.results.tables import read_table
-from ancf_petsc.solve.equations import Equations
-from ancf_petsc.solve.fused_newton import FusedNewton
 from ancf_petsc.solve.petsc import petsc_options
 
 ADAPTIVE = {"duration": 0.2, "outputs": 4, "integrator": "runge_kutta_5dp", "tolerance": 1e-6}

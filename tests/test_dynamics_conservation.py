@@ -7,7 +7,7 @@ import pytest
 from motion_cases import CASES, run_of
 
 from ancf_petsc import load_case
-from ancf_petsc.case.run import run_case
+from ancf_petsc.analysis.run import run_case
 from ancf_petsc.errors import MotionStopped
 from ancf_petsc.results.tables import read_table
 

@@ -7,7 +7,7 @@ import pytest
 from motion_cases import PROJECT, Followed, pendulum, slope
 
 from ancf_petsc import case_from_dict
-from ancf_petsc.case.run import run_case
+from ancf_petsc.analysis.run import run_case
 from ancf_petsc.results.tables import read_table
 
 LIFT = {"group": "hinge", "fix": ["x", "y"], "move": {"z": 0.1}, "ramp": "cosine"}

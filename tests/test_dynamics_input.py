@@ -10,7 +10,7 @@ import pytest
 from motion_cases import PROJECT, pendulum
 
 from ancf_petsc import case_from_dict
-from ancf_petsc.case.run import run_case
+from ancf_petsc.analysis.run import run_case
 from ancf_petsc.errors import CaseError, Interrupted, MotionStopped
 from ancf_petsc.results.tables import read_table
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from motion_cases import Followed, body, pendulum
 
-from ancf_petsc.solve.mass_solver import MassSolver
+from ancf_petsc.motion.mass_solver import MassSolver
 
 STILL = {"duration": 1e-3, "outputs": 1, "integrator": "runge_kutta_4", "step": 1e-3}
 VOLUME, DENSITY = 0.5 * 0.1 * 0.1, 7800.0

@@ -7,7 +7,7 @@ import pytest
 from motion_cases import PROJECT, Followed, body, pendulum
 
 from ancf_petsc import case_from_dict, load_case
-from ancf_petsc.case.vibration import COLUMNS, find_modes
+from ancf_petsc.analysis.modes import COLUMNS, find_modes
 from ancf_petsc.errors import CaseError
 from ancf_petsc.mesh.generate import make_mesh
 from ancf_petsc.results.tables import read_table

@@ -7,10 +7,10 @@ from family import mesh_of
 from test_kernel_generic import assembled
 
 from ancf_petsc import CaseError, case_from_dict, run
-from ancf_petsc.case.vibration import COLUMNS, find_modes
+from ancf_petsc.algebra.graph import block_starts, neighbours
+from ancf_petsc.analysis.modes import COLUMNS, find_modes
 from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.kernel import beam, mean_beam
-from ancf_petsc.kernel.graph import block_starts, neighbours
 from ancf_petsc.kernel.tables import make_tables
 
 BEAM = ELEMENTS["1222"]

@@ -5,13 +5,13 @@ import itertools
 import numpy as np
 import pytest
 
+from ancf_petsc.algebra.graph import block_starts, neighbours
 from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.element.cell import CELLS
 from ancf_petsc.kernel import generic
-from ancf_petsc.kernel.graph import block_starts, neighbours
 from ancf_petsc.kernel.tables import make_tables, turn_functions
 from ancf_petsc.material import LAWS
-from ancf_petsc.system.mass import mean_products
+from ancf_petsc.model.mass import mean_products
 
 YOUNG, POISSON, DENSITY = 210e9, 0.3, 7850.0
 LAME, SHEAR = YOUNG * POISSON / (1 + POISSON) / (1 - 2 * POISSON), YOUNG / 2 / (1 + POISSON)

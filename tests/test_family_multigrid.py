@@ -9,10 +9,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ancf_petsc import case_from_dict, run
-from ancf_petsc.case.build import build
-from ancf_petsc.solve.linear import LinearSolver
+from ancf_petsc.analysis.build import build
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.solve.linear.solver import LinearSolver
 from ancf_petsc.solve.petsc import petsc_options
-from ancf_petsc.system.assembly import Assembly
 
 MULTIGRID = {"ksp_type": "cg", "pc_type": "gamg"}
 
@@ -23,12 +23,12 @@ def iterations(code, divisions, folder):
     assembly = Assembly(build(case, MPI.COMM_SELF).model)
     matrix, ksp = assembly.create_matrix(), PETSc.KSP().create(MPI.COMM_SELF)
     with petsc_options(MULTIGRID):
-        solver = LinearSolver(assembly, ksp)
+        solver = LinearSolver(assembly, matrix, ksp)
         solver.read_options()
     solver.ask_for(1e-8)
     x, load, step = assembly.reference_vector(), assembly.vector(), assembly.vector()
     assembly.tangent(x, matrix)
-    solver.renew_if_tired(matrix, x)
+    solver.renew_if_tired(x)
     load.array[:] = assembly.external_force(1.0).ravel()
     load.array[assembly.driven] = 0.0
     ksp.solve(load, step)
@@ -59,7 +59,7 @@ def test_iterations_stay_few_with_12_000_and_36_000_degrees_of_freedom(code, div
 @pytest.mark.parametrize("petsc", [MULTIGRID, {}], ids=["multigrid", "two_levels"])
 def test_coarse_levels_leave_supports_in_place(petsc, monkeypatch, tmp_path):
     """Coarse levels that move clamped nodes turn the whole beam by a little that no residual shows."""
-    monkeypatch.setattr("ancf_petsc.solve.linear.CURVED_LIMIT", 0)
+    monkeypatch.setattr("ancf_petsc.solve.linear.solver.CURVED_LIMIT", 0)
     data = cantilever(mesh_of("cantilever", "3443+4", (10, 1, 1), tmp_path), "3443+4") | {"petsc": petsc}
     results = run(case_from_dict(data, tmp_path), tmp_path / "run")
     assert results.curve["linear_iterations"][-1] > results.curve["newton_iterations"][-1]

@@ -7,9 +7,9 @@ from family import held_all_around, unit_cube
 from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.kernel.tables import make_tables
 from ancf_petsc.material import LAWS
+from ancf_petsc.model.load import Load
+from ancf_petsc.model.ramp import Ramp
 from ancf_petsc.solve.newton import Newton
-from ancf_petsc.system.load import Load
-from ancf_petsc.system.ramp import Ramp
 
 F = np.array([[1.1, 0.2, 0.0], [-0.1, 0.9, 0.1], [0.05, 0.0, 1.2]])
 PLANE = np.array([[1.1, 0.2, 0.0], [-0.1, 0.9, 0.0], [0.0, 0.0, 1.0]])

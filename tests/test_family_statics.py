@@ -207,8 +207,8 @@ def test_curved_elements_are_drawn_curved(code, kind, tmp_path):
 def test_tangents_of_surfaces_lines_and_points(tmp_path):
     """What a support on a face, on an edge and on nodes alone says of slopes; oblique faces turn the frame."""
     from ancf_petsc.mesh.complete import complete
-    from ancf_petsc.system.slopes import prescribed_slopes
-    from ancf_petsc.system.space import Space
+    from ancf_petsc.plan.slopes import prescribed_slopes
+    from ancf_petsc.plan.space import Space
 
     mesh = read_mesh(unit_cube("3843", 1, tmp_path), ("hexahedron",))
     complete(mesh, ELEMENTS["3843"])

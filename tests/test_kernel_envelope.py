@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse import random_array
 
-from ancf_petsc.kernel.envelope import envelope, factorise, solve_fields
+from ancf_petsc.algebra.envelope import envelope, factorise, solve_fields
 
 N = 40
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from element_cells import CODES, EPS, SHAPES, corners_of, functions_at, rotation, size_of
 
+from ancf_petsc.algebra.graph import block_starts, neighbours
 from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.kernel import generic, tet3413
-from ancf_petsc.kernel.graph import block_starts, neighbours
 from ancf_petsc.kernel.tables import make_tables
 from ancf_petsc.material import LAWS
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ancf_petsc.case.schema import LAWS as NAMES_IN_CASES
+from ancf_petsc.input.schema import LAWS as NAMES_IN_CASES
 from ancf_petsc.material import LAWS
 from ancf_petsc.material.tensor import determinant, dot, gram, inverse_transpose, outer, transpose
 

@@ -9,11 +9,11 @@ import pytest
 from bodies import assembly_of, odd_mesh, random_state
 from petsc4py import PETSc
 
-from ancf_petsc.kernel.blocks import factorise, solve_factors, upper_pattern
-from ancf_petsc.kernel.coarse import add_motion, restrict
-from ancf_petsc.solve.two_level import TwoLevel
-from ancf_petsc.system.half import HalfMatrix
-from ancf_petsc.system.rigid_parts import RigidParts, bisected, inverse
+from ancf_petsc.algebra.blocks import factorise, solve_factors, upper_pattern
+from ancf_petsc.algebra.coarse import add_motion, restrict
+from ancf_petsc.solve.linear.half import HalfMatrix
+from ancf_petsc.solve.linear.rigid_parts import RigidParts, bisected, inverse
+from ancf_petsc.solve.linear.two_level import TwoLevel
 
 SINGLE = 1e-5  # what single precision leaves of a preconditioner, some rounding added up
 
@@ -22,9 +22,9 @@ import json, sys
 import numpy as np
 from mpi4py import MPI
 from ancf_petsc import case_from_dict
-from ancf_petsc.case.build import build
+from ancf_petsc.analysis.build import build
 from ancf_petsc.solve.newton import Newton
-from ancf_petsc.system.assembly import Assembly
+from ancf_petsc.model.assembly import Assembly
 comm = MPI.COMM_WORLD
 case = case_from_dict(json.loads(sys.argv[1]), ".")
 newton = Newton(Assembly(build(case, comm).model), 1e-8)
@@ -35,8 +35,8 @@ x.array[:] += 1e-4 * np.sin(7 * numbers).ravel()
 rhs.array[:] = np.cos(3 * numbers).ravel()
 rhs.array[assembly.driven] = 0.0
 newton.tangent_at(x)
-newton.linear.operator(newton.matrix).mult(rhs, found)
-newton.matrix.mult(rhs, other)
+newton.linear.operator.mult(rhs, found)
+newton.matrix.mat.mult(rhs, other)
 other.axpy(-1.0, found)
 difference = other.norm() / found.norm()
 ksp = newton.linear.ksp
@@ -79,16 +79,16 @@ def body(request, tmp_path_factory):
 
 
 def dense(matrix):
-    return matrix.convert("dense").getDenseArray().copy()
+    return matrix.mat.convert("dense").getDenseArray().copy()
 
 
 def test_half_the_numbers_multiply_as_all_of_them(body):
     assembly, _, matrix = body
-    half, x, y, expected = HalfMatrix(assembly), *(assembly.vector() for _ in range(3))
+    half, x, y, expected = HalfMatrix(assembly, matrix), *(assembly.vector() for _ in range(3))
     half.refresh()
     x.array[:] = np.random.default_rng(0).normal(size=len(x.array_r))
-    half.mult(matrix, x, y)
-    matrix.mult(x, expected)
+    half.mult(matrix.mat, x, y)
+    matrix.mat.mult(x, expected)
     np.testing.assert_allclose(y.array_r, expected.array_r, atol=1e-13 * np.abs(expected.array_r).max())
 
 
@@ -119,7 +119,7 @@ def test_factors_are_exact_where_nothing_is_left_out():
 def test_stiffness_of_the_parts_is_that_of_their_motions(body):
     """E = Zᵀ K Z with the motions Z as `add_motion` makes them; `restrict` is their transpose."""
     assembly, x, matrix = body
-    parts, half = RigidParts(assembly), HalfMatrix(assembly)
+    parts, half = RigidParts(assembly), HalfMatrix(assembly, matrix)
     half.refresh()
     parts.fill(half, assembly.local(x).copy())
     n, size = assembly.model.owned, 6 * parts.count
@@ -138,8 +138,8 @@ def test_stiffness_of_the_parts_is_that_of_their_motions(body):
 
 
 def test_the_preconditioner_is_symmetric_and_positive(body):
-    assembly, x, _ = body
-    levels = TwoLevel(assembly)
+    assembly, x, matrix = body
+    levels = TwoLevel(assembly, matrix)
     levels.take(x)
     levels.setUp(None)
     n = len(x.array_r)
@@ -159,7 +159,7 @@ def test_a_matrix_that_is_not_definite_still_makes_a_definite_preconditioner(bod
     pressed = x.copy()
     pressed.array[:] *= 0.3
     assembly.tangent(pressed, matrix)
-    half = HalfMatrix(assembly)
+    half = HalfMatrix(assembly, matrix)
     half.refresh()
     upper, right = half.half[:2]
     factor, pivots = (np.empty((m, 9), np.float32) for m in (len(right), len(upper) - 1))
@@ -213,5 +213,5 @@ def test_options_choose_another_solver(tmp_path):
     with petsc_options({"ksp_type": "cg", "pc_type": "icc"}):
         newton = Newton(assembly, 1e-8)
         assert newton.linear.describe().startswith("cg + icc")
-        assert newton.linear.operator(newton.matrix).getType() != PETSc.Mat.Type.PYTHON
+        assert newton.linear.operator.getType() != PETSc.Mat.Type.PYTHON
         newton.destroy()

@@ -8,14 +8,15 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ancf_petsc.analysis.build import build_from
 from ancf_petsc.bench.problems import HEIGHT, block, stretched_force
 from ancf_petsc.bench.yardstick import timed
-from ancf_petsc.case.blueprint import draw
-from ancf_petsc.case.build import build_from
-from ancf_petsc.case.load import case_from_dict
+from ancf_petsc.input.load import case_from_dict
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.model.matrix import Matrix
+from ancf_petsc.model.measures import reaction
 from ancf_petsc.parallel.exchange import on_root
-from ancf_petsc.system.assembly import Assembly
-from ancf_petsc.system.measures import reaction
+from ancf_petsc.plan.plan import draw
 
 STRETCH = 0.9
 
@@ -78,12 +79,12 @@ def _derivative_error(assembly: Assembly, x: PETSc.Vec) -> float:
     return abs(grown / stretched_force(STRETCH)[1] - 1)
 
 
-def _product_error(assembly: Assembly, x: PETSc.Vec, matrix: PETSc.Mat) -> float:
+def _product_error(assembly: Assembly, x: PETSc.Vec, matrix: Matrix) -> float:
     direction, product = assembly.reference_vector(), assembly.vector()
     direction.array[:] = np.sin(direction.array_r * (40 / HEIGHT))
     direction.array[assembly.driven] = 0.0
     assembly.tangent(x, matrix)
-    matrix.mult(direction, product)
+    matrix.mat.mult(direction, product)
     expected = assembly.vector()
     expected.array[:] = assembly.tangent_product(x, direction).ravel()
     expected.array[assembly.driven] = 0.0

@@ -18,6 +18,10 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from ancf_petsc.analysis.build import build, build_from
+from ancf_petsc.analysis.host.versions import versions
+from ancf_petsc.analysis.run import run_case
+from ancf_petsc.analysis.statics import Statics
 from ancf_petsc.bench.elements import compile_catalogue, points
 from ancf_petsc.bench.kernels import residual, tangent
 from ancf_petsc.bench.meshes import mesh_path
@@ -25,16 +29,12 @@ from ancf_petsc.bench.messages import exchange_cost, messages
 from ancf_petsc.bench.problems import PROBLEMS, block, block_force_234, reference_tip
 from ancf_petsc.bench.solvers import iterations
 from ancf_petsc.bench.yardstick import copy_rate, gather_time
-from ancf_petsc.case.blueprint import draw_on
-from ancf_petsc.case.build import build, build_from
-from ancf_petsc.case.load import Case, case_from_dict
-from ancf_petsc.case.load_path import Statics
-from ancf_petsc.case.run import run_case
-from ancf_petsc.case.versions import versions
 from ancf_petsc.element.catalog import element
 from ancf_petsc.errors import NoEquilibrium
+from ancf_petsc.input.load import Case, case_from_dict
 from ancf_petsc.mesh.read import read_mesh
 from ancf_petsc.parallel.exchange import on_root
+from ancf_petsc.plan.plan import draw_on
 from ancf_petsc.results.reader import open_results
 
 Result = dict[str, Any]

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from ancf_petsc.analysis.build import build_from
 from ancf_petsc.bench.problems import block
 from ancf_petsc.bench.yardstick import timed
-from ancf_petsc.case.blueprint import draw
-from ancf_petsc.case.build import build_from
-from ancf_petsc.case.load import case_from_dict
+from ancf_petsc.input.load import case_from_dict
 from ancf_petsc.parallel.exchange import on_root
+from ancf_petsc.plan.plan import draw
 
 SMALL, LARGE, ROUNDS = 8, 2**23, 200
 

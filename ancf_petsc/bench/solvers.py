@@ -7,14 +7,14 @@ from typing import Any
 
 from mpi4py import MPI
 
+from ancf_petsc.analysis.build import build
 from ancf_petsc.bench.problems import beam
-from ancf_petsc.case.build import build
-from ancf_petsc.case.load import case_from_dict
+from ancf_petsc.input.load import case_from_dict
+from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import on_root
+from ancf_petsc.solve.load_path import LoadPath
 from ancf_petsc.solve.newton import Newton
 from ancf_petsc.solve.petsc import petsc_options
-from ancf_petsc.solve.statics import LoadPath
-from ancf_petsc.system.assembly import Assembly
 
 REDUCTION = 1e-8
 SOLVERS: dict[str, dict[str, object]] = {
@@ -45,7 +45,7 @@ def iterations(comm: MPI.Comm, *, mesh: str, element: str, solver: str, repetiti
         seconds.append(time.perf_counter() - begun)
         counts.append(ksp.getIterationNumber())
     rest = rhs.duplicate()
-    newton.matrix.mult(found, rest)
+    newton.matrix.mat.mult(found, rest)
     rest.axpy(-1.0, rhs)
     facts = {"dof": assembly.model.dof, "seconds": seconds, "solver": newton.linear.describe()}
     error = rest.norm() / rhs.norm()

@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.jit import kernel
 
 COPIED = 2**24  # doubles in an array to copy, 128 MB: no cache holds it
 

@@ -9,8 +9,8 @@ from ancf_petsc.cli.run import add_case_arguments, changes
 from ancf_petsc.launcher import quick_if_alone
 
 if TYPE_CHECKING:
-    from ancf_petsc.case.blueprint import Blueprint
-    from ancf_petsc.case.load import Case
+    from ancf_petsc.input.load import Case
+    from ancf_petsc.plan.plan import Blueprint
 
 HELP = "check a case and its mesh, solve nothing"
 PETSC_OPTIONS = True
@@ -24,9 +24,9 @@ def execute(arguments: argparse.Namespace) -> int:
     with quick_if_alone():
         from mpi4py import MPI
 
-    from ancf_petsc.case.blueprint import draw
-    from ancf_petsc.case.load import load_case
+    from ancf_petsc.input.load import load_case
     from ancf_petsc.parallel.exchange import on_root
+    from ancf_petsc.plan.plan import draw
 
     comm = MPI.COMM_WORLD
 
@@ -78,7 +78,7 @@ def _print_mesh(blueprint: Blueprint) -> None:
 def _print_case(case: Case, blueprint: Blueprint) -> None:
     import numpy as np
 
-    from ancf_petsc.case.memory import memory_estimate
+    from ancf_petsc.analysis.host.memory import memory_estimate
     from ancf_petsc.cli.console import show_facts
 
     spec = case.spec
@@ -115,7 +115,7 @@ def _print_case(case: Case, blueprint: Blueprint) -> None:
 
 
 def _analysis(case: Case) -> str:
-    from ancf_petsc.case.blueprint import output_times
+    from ancf_petsc.plan.plan import output_times
 
     if case.spec.statics:
         return f"statics, {len(output_times(case.spec, case.file))} outputs after the start"

@@ -68,9 +68,9 @@ def execute(arguments: argparse.Namespace) -> int:
 def _print_versions() -> None:
     from petsc4py import PETSc
 
-    from ancf_petsc.case.versions import versions
+    from ancf_petsc.analysis.host.versions import versions
     from ancf_petsc.cli.console import show_facts
-    from ancf_petsc.kernel.compiled import CACHE_FOLDER
+    from ancf_petsc.jit import CACHE_FOLDER
 
     there = [name for name in PACKAGES if PETSc.Sys.hasExternalPackage(name)]
     show_facts(

@@ -28,9 +28,9 @@ def execute(arguments: argparse.Namespace) -> int:
         from mpi4py import MPI
 
     from ancf_petsc import log
-    from ancf_petsc.case.load import load_case
-    from ancf_petsc.case.vibration import find_modes
+    from ancf_petsc.analysis.modes import find_modes
     from ancf_petsc.cli.console import show_table
+    from ancf_petsc.input.load import load_case
     from ancf_petsc.parallel.exchange import on_root
 
     if arguments.count < 1:

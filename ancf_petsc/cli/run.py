@@ -48,8 +48,8 @@ def execute(arguments: argparse.Namespace) -> int:
         from mpi4py import MPI
 
     from ancf_petsc import log
-    from ancf_petsc.case.load import load_case
-    from ancf_petsc.case.run import run_case
+    from ancf_petsc.analysis.run import run_case
+    from ancf_petsc.input.load import load_case
     from ancf_petsc.parallel.exchange import on_root
 
     comm = MPI.COMM_WORLD

@@ -89,8 +89,8 @@ def _step(results: Results, arguments: argparse.Namespace) -> int:
 
 
 def _show_case(arguments: argparse.Namespace) -> None:
-    from ancf_petsc.case.load import load_case
     from ancf_petsc.element.catalog import element
+    from ancf_petsc.input.load import load_case
     from ancf_petsc.mesh.groups import choose_groups
     from ancf_petsc.mesh.read import read_mesh
     from ancf_petsc.post import case_view

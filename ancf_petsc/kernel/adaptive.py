@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 from numba.extending import register_jitable
 
-from ancf_petsc.kernel.compiled import composed, kernel
+from ancf_petsc.jit import composed, kernel
 
 STEPS = np.array(
     [

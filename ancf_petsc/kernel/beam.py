@@ -15,8 +15,8 @@ from functools import cache
 import numpy as np
 from numba.extending import register_jitable
 
+from ancf_petsc.jit import kernel
 from ancf_petsc.kernel.cell import add_rows, gather, scatter
-from ancf_petsc.kernel.compiled import kernel
 from ancf_petsc.kernel.tet3413 import Kernels
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba.extending import register_jitable
 
-from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.jit import kernel
 
 
 @register_jitable

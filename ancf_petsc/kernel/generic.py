@@ -15,6 +15,7 @@ from functools import cache
 
 import numpy as np
 
+from ancf_petsc.jit import composed, kernel
 from ancf_petsc.kernel.cell import (
     ZERO,
     add_products,
@@ -29,7 +30,6 @@ from ancf_petsc.kernel.cell import (
     stress_changes,
     unit,
 )
-from ancf_petsc.kernel.compiled import composed, kernel
 from ancf_petsc.kernel.tet3413 import Kernels
 from ancf_petsc.material.models import Law, green_lagrange
 from ancf_petsc.material.tensor import add, determinant, dot, scale, transpose

@@ -14,14 +14,14 @@ from typing import NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
-from ancf_petsc.kernel.compiled import composed, kernel
-from ancf_petsc.kernel.envelope import solve_one
+from ancf_petsc.algebra.envelope import solve_one
+from ancf_petsc.jit import composed, kernel
 
 DONE, WANTS_FACTOR, FAILED = range(3)
 
 
 class Scheme(NamedTuple):
-    """A step h of the method, in the notation of `solve/integrators/generalized_alpha`."""
+    """A step h of the method, in the notation of `motion/integrators/generalized_alpha`."""
 
     h: float
     alpha_m: float

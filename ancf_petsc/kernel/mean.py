@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
-from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.jit import kernel
 from ancf_petsc.kernel.tet3413 import add_block, edge_sum, nodes_of, scatter_force
 from ancf_petsc.material.models import Law
 from ancf_petsc.material.tensor import add, determinant, scale

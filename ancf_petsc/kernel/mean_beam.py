@@ -14,9 +14,9 @@ from functools import cache
 import numpy as np
 from numba.extending import register_jitable
 
+from ancf_petsc.jit import kernel
 from ancf_petsc.kernel.beam import derivatives, strains
 from ancf_petsc.kernel.cell import gather, scatter
-from ancf_petsc.kernel.compiled import kernel
 from ancf_petsc.kernel.mean import MeanKernels
 from ancf_petsc.kernel.mean_generic import add_row
 

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 from numba.extending import register_jitable
 
+from ancf_petsc.jit import kernel
 from ancf_petsc.kernel.cell import (
     add_products,
     add_stress,
@@ -19,7 +20,6 @@ from ancf_petsc.kernel.cell import (
     stress_changes,
     unit,
 )
-from ancf_petsc.kernel.compiled import kernel
 from ancf_petsc.kernel.mean import MeanKernels
 from ancf_petsc.kernel.tet3413 import add_block
 from ancf_petsc.material.models import Law

@@ -21,9 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
+from ancf_petsc.algebra.envelope import solve_components
+from ancf_petsc.jit import composed, kernel
 from ancf_petsc.kernel.adaptive import leap_kernel
-from ancf_petsc.kernel.compiled import composed, kernel
-from ancf_petsc.kernel.envelope import solve_components
 from ancf_petsc.kernel.implicit import alpha_kernel
 from ancf_petsc.kernel.tet3413 import edge_sum, nodes_of, scatter_force
 from ancf_petsc.material.models import Law

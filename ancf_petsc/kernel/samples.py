@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ancf_petsc.algebra import blocks, coarse
+from ancf_petsc.algebra.envelope import envelope, factorise, solve_fields
+from ancf_petsc.algebra.graph import block_starts, neighbours
 from ancf_petsc.element.element import Element
-from ancf_petsc.kernel import blocks, coarse
 from ancf_petsc.kernel.choice import way_of
 from ancf_petsc.kernel.constant import add_mass, add_mass_blocks, mass_product
-from ancf_petsc.kernel.envelope import envelope, factorise, solve_fields
-from ancf_petsc.kernel.graph import block_starts, neighbours
 from ancf_petsc.kernel.implicit import Progress, Scheme, Test
 from ancf_petsc.kernel.motion import MotionKernels
 from ancf_petsc.kernel.tables import nodes_with_slopes

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
-from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.jit import kernel
 from ancf_petsc.material.models import Law, green_lagrange
 from ancf_petsc.material.tensor import (
     add,

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.element.element import Element
+from ancf_petsc.jit import CACHE_FOLDER, digest
 from ancf_petsc.kernel.choice import way_of
-from ancf_petsc.kernel.compiled import CACHE_FOLDER, digest
 from ancf_petsc.kernel.samples import Call, common_calls, law_calls
 from ancf_petsc.material.models import LAWS, Law
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba.extending import register_jitable
 
-from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.jit import kernel
 from ancf_petsc.mesh.groups import measure
 from ancf_petsc.mesh.kinds import KINDS, edge_lengths, part_sizes, qualities
 from ancf_petsc.mesh.mesh import Floats, Integers, Mesh

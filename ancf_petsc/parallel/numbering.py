@@ -9,7 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ancf_petsc.kernel.graph import neighbours
+from ancf_petsc.algebra.graph import neighbours
 from ancf_petsc.parallel.exchange import exchange, first_of_each_rank, lookup, scatter_rows
 from ancf_petsc.parallel.partition import partition_nodes
 from ancf_petsc.parallel.slabs import slab_bounds

@@ -1,1 +1,1 @@
-"""Moving a model along its load path or through time, with PETSc's solvers."""
+"""Equilibrium: linear and nonlinear solvers, the load path, stability, natural modes."""

@@ -10,8 +10,9 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from ancf_petsc.errors import AncfError
-from ancf_petsc.system.assembly import Assembly
-from ancf_petsc.system.mass import Mass
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.model.mass import Mass
+from ancf_petsc.model.matrix import Matrix
 
 TOLERANCE = 1e-10
 
@@ -19,11 +20,12 @@ TOLERANCE = 1e-10
 @dataclass(frozen=True)
 class Modes:
     """omega_squared (m,) ascending, negative where the state is unstable; shapes (m, n, 3), of mass 1, on
-    owned nodal vectors.
+    owned nodal vectors. scale: largest stiffness over largest mass, what a small omega squared is small against.
     """
 
     omega_squared: NDArray[np.float64]
     shapes: NDArray[np.float64]
+    scale: float
 
     @property
     def frequencies(self) -> NDArray[np.float64]:
@@ -36,16 +38,19 @@ def modes_at(assembly: Assembly, mass: Mass, x: PETSc.Vec, count: int) -> Modes:
     Collective.
 
     Driven degrees of freedom have stiffness but no mass: their eigenvalues are infinite and never seen. The
-    inverse is taken at a shift below zero, about the lowest omega squared of the body's size, so that rigid
-    motions do no harm.
+    inverse is taken at a shift below zero, about the lowest omega squared of the body's size (stiffness over mass,
+    over the number of nodes squared), so that rigid motions do no harm.
     """
     stiffness = assembly.create_matrix()
     assembly.tangent(x, stiffness)
-    carrier = Assembly(assembly.model)
-    inertia = carrier.create_matrix()
-    carrier.fill_mass(inertia, mass.values)
+    inertia = assembly.create_matrix()
+    mass.add_to(inertia)
+    inertia.close()
+    scale = _scale(stiffness, mass)
     free = assembly.comm.allreduce(int((assembly.model.motion[: assembly.model.owned] < 0).sum()))
-    solver = _solver(assembly, stiffness, inertia, min(count, free), _shift(assembly, mass))
+    solver = _solver(
+        stiffness, inertia, min(count, free), -1e-3 * scale / (assembly.model.dof / 3) ** (4 / 3)
+    )
     try:
         solver.solve()
         found = solver.getConverged()
@@ -53,26 +58,22 @@ def modes_at(assembly: Assembly, mass: Mass, x: PETSc.Vec, count: int) -> Modes:
             raise AncfError(
                 f"only {found} of {count} modes were found: ask for fewer, or look at the material"
             )
-        return _collect(solver, assembly, min(count, free))
+        return _collect(solver, assembly, min(count, free), scale)
     finally:
         for item in (solver, inertia, stiffness):
             item.destroy()
 
 
-def _shift(assembly: Assembly, mass: Mass) -> float:
-    """A small negative number on the scale of omega squared: stiffness over mass, over the number of nodes
-    squared.
-    """
-    own = float(mass.diagonal.max(initial=0.0))
-    heaviest = max(assembly.comm.allgather(own))
-    nodes = assembly.model.dof / 3
-    return -1e-3 * assembly.largest_diagonal / heaviest / nodes ** (4 / 3)
+def _scale(stiffness: Matrix, mass: Mass) -> float:
+    """Largest stiffness over largest mass. Collective."""
+    heaviest = max(mass.comm.allgather(float(mass.diagonal.max(initial=0.0))))
+    return stiffness.largest_diagonal / heaviest
 
 
-def _solver(assembly: Assembly, K: PETSc.Mat, M: PETSc.Mat, count: int, shift: float) -> SLEPc.EPS:
-    solver = SLEPc.EPS().create(assembly.comm)
+def _solver(stiffness: Matrix, inertia: Matrix, count: int, shift: float) -> SLEPc.EPS:
+    solver = SLEPc.EPS().create(stiffness.comm)
     solver.setOptionsPrefix("modes_")
-    solver.setOperators(K, M)
+    solver.setOperators(stiffness.mat, inertia.mat)
     solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     solver.setDimensions(nev=count)
     solver.setTolerances(TOLERANCE, 500)
@@ -88,7 +89,7 @@ def _solver(assembly: Assembly, K: PETSc.Mat, M: PETSc.Mat, count: int, shift: f
     return solver
 
 
-def _collect(solver: SLEPc.EPS, assembly: Assembly, count: int) -> Modes:
+def _collect(solver: SLEPc.EPS, assembly: Assembly, count: int, scale: float) -> Modes:
     values, shapes = np.empty(count), np.empty((count, assembly.model.owned, 3))
     shape = assembly.vector()
     for k in range(count):
@@ -96,4 +97,4 @@ def _collect(solver: SLEPc.EPS, assembly: Assembly, count: int) -> Modes:
         shapes[k] = shape.array_r.reshape(-1, 3)
     shape.destroy()
     order = np.argsort(values, kind="stable")
-    return Modes(values[order], shapes[order])
+    return Modes(values[order], shapes[order], scale)

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.forcing import Forcing
-from ancf_petsc.solve.linear import LinearSolver
+from ancf_petsc.solve.linear.solver import LinearSolver
 from ancf_petsc.solve.petsc import default_options
-from ancf_petsc.system.assembly import Assembly
 
 MOST_ITERATIONS = 25
 PREDICTOR_TERM = 1e-8  # the path's slope is made of it, and extrapolated from
@@ -51,8 +51,8 @@ class Newton:
         self._residuals: list[float] = []
         self._supported = (0.0, 0.0)
         self._snes = self._create()
-        self.linear = LinearSolver(assembly, self._snes.getKSP())
-        self._snes.setJacobian(self._tangent, self.linear.operator(self.matrix), self.matrix)
+        self.linear = LinearSolver(assembly, self.matrix, self._snes.getKSP())
+        self._snes.setJacobian(self._tangent, self.linear.operator, self.matrix.mat)
         # Preconditioners are renewed by hand, after each tangent: SNES itself does it the first time only.
         with default_options({"snes_lag_preconditioner": -2}):
             self._snes.setFromOptions()
@@ -132,7 +132,7 @@ class Newton:
 
     def tangent_at(self, x: PETSc.Vec) -> None:
         """Make the linear solver ready for the tangent at x. Collective."""
-        self._tangent(self._snes, x, self.linear.operator(self.matrix), self.matrix)
+        self._tangent(self._snes, x, self.linear.operator, self.matrix.mat)
 
     def out_of_balance(self, x: PETSc.Vec):
         """Q - Q_e (n, 3) on owned nodal vectors at the present pseudo-time: reactions where driven."""
@@ -151,8 +151,8 @@ class Newton:
         f.array[:] = values if smallest > 0.0 else np.nan
 
     def _tangent(self, snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
-        self.assembly.tangent(x, P)
-        self.linear.renew_if_tired(P, x)
+        self.assembly.tangent(x, self.matrix)
+        self.linear.renew_if_tired(x)
         self.linear.ask_for(self._term)
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
@@ -173,5 +173,5 @@ class Newton:
     def _force_scale(self) -> float:
         """The largest of the norms of reactions and loads, and what rounding leaves of the tangent times the size."""
         reactions, loads = np.sqrt(combined(self.comm, np.array(self._supported)))
-        floor = 1e-14 * self.assembly.largest_diagonal * self.assembly.model.size
+        floor = 1e-14 * self.matrix.largest_diagonal * self.assembly.model.size
         return max(reactions, loads, floor / self.tolerance)

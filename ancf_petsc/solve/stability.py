@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from ancf_petsc.solve.linear import negative_pivots_of
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.solve.linear.solver import negative_pivots_of
 from ancf_petsc.solve.newton import Newton
-from ancf_petsc.system.assembly import Assembly
 
 SVK_LIMIT = 1.0 / np.sqrt(3.0)
 LARGEST_TO_FACTOR = 300_000
@@ -34,7 +34,7 @@ def why_it_ends(newton: Newton, x: PETSc.Vec, s: float, reason: str, smallest_st
     pivots = None
     if assembly.model.dof <= LARGEST_TO_FACTOR:
         assembly.tangent(x, newton.matrix)
-        pivots = negative_pivots_of(newton.matrix)
+        pivots = negative_pivots_of(newton.matrix.mat)
     place = ", ".join(f"{c:.6g}" for c in centroid)
     line = (
         f"no equilibrium beyond pseudo-time {s:.6g}: steps of {smallest_step:g} still fail ({reason}); "

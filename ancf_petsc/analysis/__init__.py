@@ -1,0 +1,1 @@
+"""A case from its file to its results: what is set up, run, watched and recorded."""

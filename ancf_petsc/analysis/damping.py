@@ -1,0 +1,83 @@
+"""The damping alpha of a case: a number, or critical for a mode: alpha = 4 pi / T, Olshevskiy et al.
+(2017), Eq. (16).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import pi, sqrt
+
+from petsc4py import PETSc
+
+from ancf_petsc.errors import CaseError, NoEquilibrium
+from ancf_petsc.input.load import Case
+from ancf_petsc.input.schema import CriticalMode
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.model.mass import Mass
+from ancf_petsc.model.ramp import Ramp
+from ancf_petsc.solve.load_path import LoadPath
+from ancf_petsc.solve.newton import Newton
+
+STATIC_TOLERANCE, SMALLEST_STEP = 1e-9, 1e-3
+RIGID = 1e-9
+"""Of the scale of omega squared: what is below is a rigid motion."""
+
+
+@dataclass(frozen=True)
+class Damping:
+    """alpha in 1 / unit of time, and where it comes from, in words."""
+
+    alpha: float
+    source: str = ""
+
+
+def damping_of(case: Case, assembly: Assembly, mass: Mass) -> Damping:
+    """The damping the case asks for. Raises CaseError where there is no such mode. Collective."""
+    asked = case.spec.dynamics.damping  # type: ignore[union-attr]
+    if isinstance(asked, CriticalMode):
+        x = assembly.reference_vector()
+        number, state = asked.critical, "the unloaded body"
+    elif asked == "critical":
+        x = static_answer(case, assembly)
+        number, state = 1, "the body under its loads at rest"
+    else:
+        return Damping(float(asked))
+    from ancf_petsc.solve.modes import modes_at
+
+    modes = modes_at(assembly, mass, x, number)
+    x.destroy()
+    if len(modes.omega_squared) < number or modes.omega_squared[number - 1] <= RIGID * modes.scale:
+        raise _refused(case, f"mode {number} of {state} does not vibrate: it is a rigid motion or unstable")
+    omega = sqrt(modes.omega_squared[number - 1])
+    return Damping(2 * omega, f"= 4 pi / T, critical for mode {number} of {state}: T = {2 * pi / omega:.6g}")
+
+
+def static_answer(case: Case, assembly: Assembly) -> PETSc.Vec:
+    """The body at rest under its loads and moves as they are at the end. Collective."""
+    model = assembly.model
+    linear = Ramp("linear")
+    loads = [replace(load, pattern=load.ramp.value(1.0) * load.pattern, ramp=linear) for load in model.loads]
+    motions = [
+        replace(motion, amplitude=motion.value(1.0), ramp=linear) if motion.amplitude else motion
+        for motion in model.motions
+    ]
+    newton = Newton(Assembly(replace(model, loads=loads, motions=motions)), STATIC_TOLERANCE)
+    path = LoadPath(newton, [1.0], [], SMALLEST_STEP, lambda step, x: None)
+    try:
+        path.run()
+    except NoEquilibrium as error:
+        raise _refused(case, f"there is no static answer to the loads ({error})") from error
+    finally:
+        newton.destroy()
+    return path.x
+
+
+def _refused(case: Case, why: str) -> CaseError:
+    return CaseError(
+        why,
+        file=case.file,
+        key="dynamics.damping",
+        expected="a mode to damp critically",
+        cure="give a number, or { critical = n } with a mode of the unloaded body that vibrates "
+        "(ancf modes lists them)",
+    )

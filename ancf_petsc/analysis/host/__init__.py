@@ -1,0 +1,1 @@
+"""The computer a case runs on: clock, signals, memory, versions of what is installed."""

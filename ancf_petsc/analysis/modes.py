@@ -1,0 +1,90 @@
+"""The first modes of a case's body: a table of frequencies, and the shapes as steps of a result."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ancf_petsc.analysis.build import build_from
+from ancf_petsc.analysis.damping import static_answer
+from ancf_petsc.analysis.drawn_points import DrawnPoints
+from ancf_petsc.analysis.host.versions import program_version
+from ancf_petsc.errors import CaseError
+from ancf_petsc.input.load import Case
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.model.mass import Mass
+from ancf_petsc.parallel.exchange import on_root
+from ancf_petsc.plan.plan import draw
+from ancf_petsc.results.folder import check_folder, claim_folder
+from ancf_petsc.results.store import ResultStore
+from ancf_petsc.results.tables import Table
+from ancf_petsc.solve.modes import Modes, modes_at
+from ancf_petsc.solve.petsc import petsc_options, refuse_unused
+
+LARGEST_SHOWN = 0.1  # of the size of the body: the largest displacement of a shape
+COLUMNS = ("mode", "frequency", "period", "omega", "critical_damping")
+log = logging.getLogger("ancf")
+
+
+def find_modes(
+    case: Case, folder: Path, count: int, *, loaded: bool, force: bool, comm: MPI.Comm = MPI.COMM_WORLD
+) -> NDArray[np.float64]:
+    """Rows (m, 5) of COLUMNS, written to modes.csv; shapes to results.h5 and .xdmf. Collective. Raises
+    CaseError.
+
+    loaded: of the body at rest under its loads, else of the undeformed one.
+    """
+    title = f"{case.spec.title}: modes"
+    _need_density(case)
+    on_root(comm, lambda: check_folder(folder, title, force=force))
+    with petsc_options(case.spec.petsc):
+        built = build_from(case, on_root(comm, lambda: draw(case)), comm)
+        assembly = Assembly(built.model)
+        lumped = case.spec.dynamics is not None and case.spec.dynamics.mass == "lumped"
+        mass = Mass(assembly, lumped=lumped)
+        x = static_answer(case, assembly) if loaded else assembly.reference_vector()
+        modes = modes_at(assembly, mass, x, count)
+        refuse_unused(case.spec.petsc)
+    on_root(comm, lambda: claim_folder(folder))
+    rows = _rows(modes)
+    if comm.rank == 0:
+        with Table(folder / "modes.csv", COLUMNS) as table:
+            for row in rows:
+                table.append(row)
+    store = ResultStore(folder, comm, title, case.spec.units, note=case.spec.note, version=program_version())
+    order = built.order
+    store.write_mesh(
+        order.points, order.kind, order.cells, order.node_numbers, order.cell_numbers, order.groups
+    )
+    drawn = DrawnPoints(assembly, order)
+    before = x.array_r.reshape(-1, 3) - built.model.reference[: built.model.owned]
+    for row, shape in zip(rows, modes.shapes, strict=True):
+        largest = comm.allreduce(float(np.abs(shape[built.model.own_positions]).max(initial=0.0)), MPI.MAX)
+        shown = before + LARGEST_SHOWN * built.model.size / largest * shape
+        fields = {"displacement": drawn(shown)}
+        store.write_step(row[0], fields, {}, {"frequency": row[1]})
+    return rows
+
+
+def _rows(modes: Modes) -> NDArray[np.float64]:
+    frequency = modes.frequencies
+    with np.errstate(divide="ignore"):
+        period = 1.0 / frequency
+    numbers = np.arange(1, len(frequency) + 1)
+    return np.stack((numbers, frequency, period, 2 * np.pi * frequency, 4 * np.pi * frequency), axis=1)
+
+
+def _need_density(case: Case) -> None:
+    for number, material in enumerate(case.spec.material):
+        if material.density is None:
+            raise CaseError(
+                "missing",
+                file=case.file,
+                key=f"material.{material.group or number}.density",
+                expected="a number > 0: vibrations need mass",
+                cure="such as density = 1350.0",
+            )

@@ -1,0 +1,175 @@
+"""A motion's run: steps with their work, log lines and outputs."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ancf_petsc.analysis.host.clock import Clock
+from ancf_petsc.analysis.record import Record
+from ancf_petsc.errors import Interrupted, MotionStopped
+from ancf_petsc.log import STEPS
+from ancf_petsc.model.measures import AXES, conjugates
+from ancf_petsc.model.motion_work import MotionWork, Powers
+from ancf_petsc.motion.integration import TimeIntegration
+from ancf_petsc.motion.integrators import Step
+from ancf_petsc.parallel.exchange import combined
+
+if TYPE_CHECKING:
+    from ancf_petsc.analysis.motion import Motion
+
+COUNTS = ("newton_iterations", "linear_iterations", "steps", "rejected_steps")
+log = logging.getLogger(STEPS)
+
+
+class MotionRun:
+    """Follows a motion and records it. watch: told the part done, 0 to 1. stop: whether to end after this
+    step.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        record: Record,
+        clock: Clock,
+        watch: Callable[[float], None],
+        stop: Callable[[], bool],
+    ) -> None:
+        self.record, self.clock, self.watch = record, clock, watch
+        self.integrator, self.equations, self.mass = motion.integrator, motion.equations, motion.mass
+        self.assembly = motion.assembly
+        self.duration = motion.spec.duration
+        self.times = set(motion.times)
+        self.totals = dict.fromkeys(COUNTS, 0)
+        self._since = dict.fromkeys(COUNTS, 0)
+        model = self.assembly.model
+        self.work = MotionWork(model.motions, model.loads, self.duration)
+        self._ramped = any(load.ramp.kind != "constant" for load in model.loads)
+        self._kinetic = 0.0
+        self._start_energy = 0.0
+        self._begun = time.perf_counter()
+        self.path = TimeIntegration(self.integrator, motion.times, self._on_step, self._on_corner, stop)
+
+    def go(self) -> None:
+        """To the end. Raises MotionStopped or Interrupted, with the last good state saved."""
+        self.work.start(0.0, self._powers())
+        self._start_energy = self.assembly.strain_energy(self.integrator.x) + self._kinetic_energy()
+        self._write()
+        try:
+            self.path.run()
+        except (MotionStopped, Interrupted):
+            if self.integrator.time != self._written:
+                self._write()
+            raise
+        finally:
+            self.path.destroy()
+
+    # --- steps
+
+    def _on_step(self, step: Step) -> None:
+        for name, count in zip(COUNTS, (step.newton, step.linear, step.count, step.rejected), strict=True):
+            self.totals[name] += count
+            self._since[name] += count
+        if step.time in self.path.corners:
+            self._kinetic = self._kinetic_energy()
+        self._add_work(step)
+        if step.time in self.times:
+            self._write()
+        self.watch(step.time / self.duration)
+
+    def _add_work(self, step: Step) -> None:
+        """Every step where something changes along it; dead loads that stay need ends of intervals."""
+        if step.known is not None:
+            self.work.add_known(*step.known)
+            return
+        often = self.equations.damping or self.equations.moving or self._ramped
+        if often or step.time in self.times or step.time in self.path.corners:
+            self.work.add(step.time, self._powers())
+
+    def _on_corner(self, now: float) -> None:
+        """The work of an impulse is what it adds to the kinetic energy: positions stay."""
+        self.work.start(now, self._powers(), self._kinetic_energy() - self._kinetic)
+
+    def _powers(self) -> Powers:
+        """Loss, and what loads and driven nodes see; accelerations only where they are needed."""
+        equations, v, model = self.equations, self._velocity(), self.assembly.model
+        loss, loss_rate, balance = 0.0, 0.0, np.zeros_like(v)
+        if equations.damping or equations.moving:
+            a, carried = self._acceleration(), self.mass.times(v)
+            loss, loss_rate = float(np.vdot(v, carried)), 2 * float(np.vdot(a, carried))
+            if equations.moving:
+                balance = equations.out_of_balance(self.integrator.time, self.integrator.x, v, a)
+        rates = [float(np.vdot(load.pattern, v)) for load in model.loads]
+        loss, loss_rate, *rates = combined(self.assembly.comm, np.array([loss, loss_rate, *rates]))
+        reactions, seen = conjugates(self.assembly, self.integrator.x, balance)
+        alpha = equations.damping
+        return Powers(alpha * loss, alpha * loss_rate, seen, np.array(rates), reactions)
+
+    def _velocity(self) -> NDArray[np.float64]:
+        return self.integrator.v.array_r.reshape(-1, 3)
+
+    def _acceleration(self) -> NDArray[np.float64]:
+        return self.equations.acceleration(self.integrator.time, self.integrator.x, self._velocity())
+
+    def _kinetic_energy(self) -> float:
+        return self.mass.kinetic_energy(self._velocity())
+
+    # --- outputs
+
+    def _write(self) -> None:
+        with self.clock.part("output"):
+            x, v, now = self.integrator.x, self._velocity(), self.integrator.time
+            balance = self.equations.out_of_balance(now, x, v, self._acceleration())
+            more = {**self._energies(), **self._momenta(), **self._since}
+            row = self.record.write({"time": now}, x, balance, more, {"velocity": v})
+            self._tell(row)
+        self._since = dict.fromkeys(COUNTS, 0)
+        self._written = now
+
+    def _energies(self) -> dict[str, float]:
+        kinetic, strain = self._kinetic_energy(), self.assembly.strain_energy(self.integrator.x)
+        total = kinetic + strain + self.work.dissipated - self.work.external
+        return {
+            "kinetic_energy": kinetic,
+            "potential_energy": self._potential_energy(),
+            "dissipated_energy": self.work.dissipated,
+            "external_work": self.work.external,
+            "energy_drift": total - self._start_energy,
+        }
+
+    def _potential_energy(self) -> float:
+        """- sum m g . r with gravity as it is now."""
+        positions = self.integrator.x.array_r.reshape(-1, 3)
+        s = self.integrator.time / self.duration
+        own = sum(
+            -load.ramp.value(s) * float(np.vdot(load.pattern, positions))
+            for load in self.assembly.model.loads
+            if load.acceleration is not None
+        )
+        return combined(self.assembly.comm, own)
+
+    def _momenta(self) -> dict[str, float]:
+        linear, angular = self.mass.momenta(self.integrator.x, self._velocity())
+        columns = {f"momentum.{axis}": linear[i] for i, axis in enumerate(AXES)}
+        return columns | {f"angular_momentum.{axis}": angular[i] for i, axis in enumerate(AXES)}
+
+    def _tell(self, row: dict[str, float]) -> None:
+        now, spent = self.integrator.time, time.perf_counter() - self._begun
+        rate = now / spent if spent else 0.0
+        left = (self.duration - now) / rate if rate else 0.0
+        log.info(
+            "t %-10.6g energies: kinetic %10.4g  strain %10.4g  drift %9.2g  steps %5d  newton %5d  "
+            "rejected %3d  %.3g of time a second, %.0f s left",
+            now,
+            row["kinetic_energy"],
+            row["strain_energy"],
+            row["energy_drift"],
+            *(self._since[name] for name in ("steps", "newton_iterations", "rejected_steps")),
+            rate,
+            left,
+        )

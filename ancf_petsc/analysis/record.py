@@ -1,0 +1,135 @@
+"""What a run leaves: one row of each table and one step of the fields per output."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ancf_petsc.analysis.build import Built
+from ancf_petsc.analysis.drawn_points import DrawnPoints
+from ancf_petsc.input.schema import CaseSpec
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.model.measures import AXES, mean_position, mean_stress, reaction, von_mises
+from ancf_petsc.parallel.exchange import ToSlabs, combined
+from ancf_petsc.plan.plan import STROKE
+from ancf_petsc.results.store import ResultStore
+from ancf_petsc.results.tables import Table
+
+
+class Record:
+    """Writes outputs into a folder. Every method is collective."""
+
+    def __init__(self, folder: Path, spec: CaseSpec, built: Built, assembly: Assembly, version: str) -> None:
+        self.folder = folder
+        self.spec = spec
+        self.built = built
+        self.assembly = assembly
+        self.comm = assembly.comm
+        self.row: dict[str, float] = {}
+        self._tables: dict[str, Table] = {}
+        order, numbering = built.order, assembly.model.numbering
+        self._drawn = DrawnPoints(assembly, order)
+        own = np.flatnonzero(numbering.own_cells)
+        self._cells = ToSlabs(self.comm, numbering.file_cells[own], order.total_cells, of=own)
+        self._store = ResultStore(folder, self.comm, spec.title, spec.units, note=spec.note, version=version)
+        self._store.write_mesh(
+            order.points, order.kind, order.cells, order.node_numbers, order.cell_numbers, order.groups
+        )
+
+    def close(self) -> None:
+        """Close the tables."""
+        for table in self._tables.values():
+            table.close()
+
+    def write(
+        self,
+        time: Mapping[str, float],
+        x: PETSc.Vec,
+        out_of_balance: NDArray,
+        more: Mapping[str, float],
+        node_fields: Mapping[str, NDArray] | None = None,
+    ) -> dict[str, float]:
+        """One output at the state x. time: the one column of time; more: columns the solver knows.
+
+        node_fields: further fields (n, 3) on owned nodal vectors. Returns the row of the curve.
+        """
+        strain, cauchy, det = self.assembly.fields(x)
+        row = {**time, **self.curve(x, out_of_balance), **self._stress_force(cauchy)}
+        row |= self._energies(x, more) | {"min_det_F": combined(self.comm, det.min(initial=np.inf), MPI.MIN)}
+        row |= {name: value for name, value in more.items() if name not in row} | self._reactions(
+            out_of_balance
+        )
+        self._append("curve.csv", row)
+        if self.spec.probe:
+            self._append("probes.csv", {**time, **self._probes(x)})
+        positions, model = x.array_r.reshape(-1, 3), self.assembly.model
+        nodes = {"displacement": positions - model.reference[: model.owned], **(node_fields or {})}
+        points = {name: self._drawn(rows) for name, rows in nodes.items()}
+        if model.element.has_slopes:
+            points["slopes"] = self._drawn.slopes(positions)
+        cells = {"det_F": det, "von_mises": von_mises(cauchy), "cauchy": cauchy, "green_lagrange": strain}
+        del strain, cauchy
+        (now,) = time.values()
+        self._store.write_step(now, points, self._cell_fields(cells))
+        self.row = row
+        return row
+
+    def _cell_fields(self, cells: dict[str, NDArray]) -> Iterator[tuple[str, NDArray]]:
+        """Fields of this rank's cells on its slab of the file's, one after the other for the sake of memory."""
+        while cells:
+            name, rows = cells.popitem()
+            rows = self._cells(rows, np.zeros((len(self.built.order.cells), *rows.shape[1:])))
+            yield name, rows
+
+    def curve(self, x: PETSc.Vec, out_of_balance: NDArray) -> dict[str, float]:
+        """Stroke and force of the whole body, empty if the case asks for no curve."""
+        chosen = self.built.curve
+        if chosen is None:
+            return {}
+        force = reaction(self.assembly, out_of_balance, chosen.force_group)[chosen.force_axis]
+        return {
+            "stroke": mean_position(self.assembly, x, STROKE)[1][chosen.stroke_axis],
+            "force": self.spec.output.symmetry * force,
+        }
+
+    def _stress_force(self, cauchy: NDArray) -> dict[str, float]:
+        """The paper's force: mean stress times undeformed area."""
+        chosen = self.built.curve
+        if chosen is None or chosen.area is None:
+            return {}
+        stress = mean_stress(self.assembly, cauchy, chosen.force_group, chosen.force_axis)
+        return {"force_stress_area": self.spec.output.symmetry * stress * chosen.area}
+
+    def _energies(self, x: PETSc.Vec, more: Mapping[str, float]) -> dict[str, float]:
+        """Energies and work of the whole body: symmetry counts."""
+        symmetry = self.spec.output.symmetry
+        given = {name: value for name, value in more.items() if name.endswith(("_energy", "_work", "_drift"))}
+        whole = {"strain_energy": self.assembly.strain_energy(x), **given}
+        return {name: symmetry * value for name, value in whole.items()}
+
+    def _reactions(self, out_of_balance: NDArray) -> dict[str, float]:
+        columns: dict[str, float] = {}
+        for group in dict.fromkeys(spec.group for spec in self.spec.constraint):
+            total = self.spec.output.symmetry * reaction(self.assembly, out_of_balance, group)
+            columns |= {f"{group}.r{axis}": total[i] for i, axis in enumerate(AXES)}
+        return columns
+
+    def _probes(self, x: PETSc.Vec) -> dict[str, float]:
+        columns: dict[str, float] = {}
+        for probe in self.spec.probe:
+            position, displacement = mean_position(self.assembly, x, f"probe {probe.name}")
+            columns |= {f"{probe.name}.{axis}": position[i] for i, axis in enumerate(AXES)}
+            columns |= {f"{probe.name}.u{axis}": displacement[i] for i, axis in enumerate(AXES)}
+        return columns
+
+    def _append(self, file: str, row: Mapping[str, float]) -> None:
+        if self.comm.rank:
+            return
+        if file not in self._tables:
+            self._tables[file] = Table(self.folder / file, list(row))
+        self._tables[file].append(row)

@@ -1,0 +1,47 @@
+"""Setting a quasi-static case up: Newton, and the outputs on the load path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ancf_petsc.analysis.build import Built
+from ancf_petsc.analysis.host.clock import Clock
+from ancf_petsc.analysis.record import Record
+from ancf_petsc.analysis.static_run import QuasiStaticRun
+from ancf_petsc.input.load import Case
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.plan.plan import output_times
+from ancf_petsc.solve.newton import Newton
+
+
+class Statics:
+    """A body ready to be loaded."""
+
+    def __init__(self, case: Case, built: Built) -> None:
+        assert case.spec.statics is not None
+        self.spec = case.spec.statics
+        self.times = output_times(case.spec, case.file)
+        self.assembly = Assembly(built.model)
+        self.newton = Newton(self.assembly, self.spec.tolerance)
+
+    def prepare(self) -> None:
+        """Set the solvers up, so that every option has been asked for."""
+        self.newton.prepare()
+
+    def describe(self) -> str:
+        """One line: the solver."""
+        return self.newton.linear.describe()
+
+    def facts(self) -> dict[str, float]:
+        """What the summary holds beside what it has of every run."""
+        return {}
+
+    def begin(
+        self, record: Record, clock: Clock, watch: Callable[[float], None], stop: Callable[[], bool]
+    ) -> QuasiStaticRun:
+        """The run, ready to go."""
+        return QuasiStaticRun(self.newton, record, self.times, self.spec.smallest_step, clock, watch, stop)
+
+    def destroy(self) -> None:
+        """Free PETSc's objects."""
+        self.newton.destroy()

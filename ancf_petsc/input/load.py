@@ -1,0 +1,125 @@
+"""A case: its checked specification and where it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from ancf_petsc.errors import CaseError, did_you_mean
+from ancf_petsc.input import toml
+from ancf_petsc.input.messages import case_error
+from ancf_petsc.input.overrides import apply_settings, petsc_table, set_value, split_path
+from ancf_petsc.input.schema import CaseSpec
+
+CASE_FILE = "case.toml"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case that has been checked.
+
+    spec: what it says. file: where it was read, None for one made in a script. folder: what its file
+    names refer to. name: the folder's name for NAME/case.toml, else the file's. text: the case as TOML,
+    changes included.
+    """
+
+    spec: CaseSpec
+    file: Path | None
+    folder: Path
+    name: str
+    text: str
+
+    @property
+    def mesh_file(self) -> Path:
+        return (self.folder / self.spec.mesh.file).resolve()
+
+    def with_changes(self, changes: Mapping[str, Any]) -> Case:
+        """The case with other values at dotted paths, such as {"material.law": "neo_hooke"}.
+
+        None takes a key away. Raises CaseError.
+        """
+        data = toml.parse(self.text)
+        for path, value in changes.items():
+            way, rest = split_path(path)
+            if rest:
+                raise CaseError(
+                    got=path, expected="a dotted path to a key", cure='quote odd names: groups."a b".at'
+                )
+            set_value(data, way, deepcopy(value))
+        return _checked(data, self.file, self.folder, self.name)
+
+
+def load_case(path: str | Path, overrides: Sequence[str] = (), petsc_options: Sequence[str] = ()) -> Case:
+    """Read and check a case: a TOML file or a folder with case.toml.
+
+    overrides: texts `key=value` as --set takes them. petsc_options: words such as ["-ksp_type", "cg"],
+    stronger than the file's. Raises CaseError.
+    """
+    file = _case_file(Path(path))
+    data = toml.read(file)
+    apply_settings(data, overrides)
+    if petsc_options:
+        for name, value in petsc_table(petsc_options).items():
+            set_value(data, ("petsc", name), value)
+    name = file.resolve().parent.name if file.name == CASE_FILE else file.stem
+    told = f"{file} with --set {' '.join(overrides)}" if overrides else file
+    return _checked(data, file, file.resolve().parent, name, told)
+
+
+def case_from_dict(data: Mapping[str, Any], folder: str | Path, name: str = "case") -> Case:
+    """A case from the tables of a script; file names refer to `folder`. Raises CaseError."""
+    return _checked(deepcopy(dict(data)), None, Path(folder).resolve(), name)
+
+
+def _checked(
+    data: dict[str, Any], file: Path | None, folder: Path, name: str, told: str | Path | None = None
+) -> Case:
+    source = _tuples(data)
+    frozen = dict(source)
+    if isinstance(source.get("material"), dict):
+        frozen["material"] = (source["material"],)
+    try:
+        spec = CaseSpec.model_validate(frozen)
+    except ValidationError as error:
+        raise case_error(error, frozen, source, told or file or name) from None
+    return Case(spec, file, folder, name, toml.write(data))
+
+
+def _tuples(value: Any) -> Any:
+    """Lists as tuples, arrays as numbers: what is checked cannot change any more."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {name: _tuples(inner) for name, inner in value.items()}
+    return tuple(map(_tuples, value)) if isinstance(value, list | tuple) else value
+
+
+def _case_file(path: Path) -> Path:
+    if path.is_dir():
+        if (path / CASE_FILE).is_file():
+            return path / CASE_FILE
+        others = ", ".join(sorted(file.name for file in path.glob("*.toml"))) or "none"
+        raise CaseError(
+            f"no {CASE_FILE} in this folder", file=path, expected=CASE_FILE, cure=f"*.toml here: {others}"
+        )
+    if path.is_file():
+        return path
+    raise CaseError(
+        "no such file or folder",
+        file=path,
+        expected="a case",
+        cure=did_you_mean(str(path), _neighbours(path)),
+    )
+
+
+def _neighbours(path: Path) -> tuple[str, ...]:
+    """Cases beside `path`, above it and in ./cases."""
+    places = dict.fromkeys((path.parent, path.parent.parent, Path("cases")))
+    found = (case.parent for place in places if place.is_dir() for case in place.glob(f"*/{CASE_FILE}"))
+    files = (file for file in path.parent.glob("*.toml") if file.name not in (CASE_FILE, "pyproject.toml"))
+    return tuple(sorted(dict.fromkeys(str(case) for case in (*found, *files))))

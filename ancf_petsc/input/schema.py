@@ -1,0 +1,245 @@
+"""The case file, format 1: every table with its keys, defaults and limits. docs/case-format.md is for users.
+
+Each key carries its expectation in words; input/messages.py makes a user's message of it. Checks across
+tables are in input/checks.py.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from ancf_petsc.input.analysis import (
+    CriticalMode,
+    DynamicsSpec,
+    InitialSpec,
+    StaticsSpec,
+)
+from ancf_petsc.input.checks import problems
+from ancf_petsc.input.types import (
+    AXES,
+    Axes,
+    Axis,
+    Direction,
+    DirectionKey,
+    Name,
+    Points,
+    RampKey,
+    Table,
+    Vector,
+    key,
+    one_of,
+    problem,
+)
+
+LAWS = ("svk", "neo_hooke")
+
+
+class MeshSpec(Table):
+    """[mesh]: the file, from the case file's folder, and the element."""
+
+    file: Name = key('a file name; relative to the case file, such as "block.msh"')
+    element: str = key(
+        'a code of the catalogue, in quotes; such as "3413"', pattern=r"^(\d{4}|\d-\d+-\d-\d)(\+\d+)?$"
+    )
+    duplicates: Literal["error", "keep", "merge"] = key("what to do about coincident nodes", "error")
+    rule: Literal["default", "reduced", "exact"] = key("a choice of quadrature", "default")
+
+
+class GroupSpec(Table):
+    """[groups] NAME: nodes chosen by geometry. Exactly one of plane, box, nearest, union."""
+
+    plane: Axis | Vector | None = key(
+        'an axis "x", "y", "z" or a normal [nx, ny, nz]; such as plane = "x"', None
+    )
+    at: float | Literal["min", "max"] | None = key(
+        'a number, "min" or "max"; where the plane cuts its normal', None
+    )
+    box: tuple[Vector, Vector] | None = key("two corners [[x, y, z], [x, y, z]]; opposite ones", None)
+    nearest: Points | None = key("a point [x, y, z] or a list of points; such as [0.5, 0.0, 0.1]", None)
+    union: tuple[Name, ...] | None = key('a list of group names; such as ["end", "slab"]', None, min_length=1)
+
+    @model_validator(mode="after")
+    def _check(self) -> GroupSpec:
+        kinds = ("plane", "box", "nearest", "union")
+        given = [kind for kind in kinds if getattr(self, kind) is not None]
+        if len(given) != 1:
+            raise problem(
+                f"{' and '.join(given) or 'nothing'} given",
+                expected="exactly one of plane, box, nearest, union",
+                cure='such as { plane = "x", at = "max" }; join two choices by union',
+            )
+        if (self.plane is None) != (self.at is None):
+            missing = "at" if self.at is None else "plane"
+            raise problem(
+                "missing", at=[missing], expected="plane and at together", cure='such as at = "min"'
+            )
+        if self.plane == (0.0, 0.0, 0.0):
+            raise problem(
+                at=["plane"], got=self.plane, expected="a normal with a length", cure='or an axis such as "x"'
+            )
+        return self
+
+
+class MaterialSpec(Table):
+    """[material], or one [[material]]: the one without a group takes what the others leave."""
+
+    group: Name | None = key("a group's name in quotes; of the mesh file or of [groups]", None)
+    law: Annotated[str, one_of(LAWS, "a law")] = key('a law; such as law = "svk"')
+    young: float = key("a number > 0; Young's modulus in the unit of stress, such as young = 6.8e6", gt=0)
+    poisson: float = key("a number in (-1, 0.5); take 0.49 for what hardly changes its volume", gt=-1, lt=0.5)
+    density: float | None = key("a number > 0; the undeformed mass per volume", None, gt=0)
+
+
+class ConstraintSpec(Table):
+    """One [[constraint]]: components held (fix) and driven (move) of a group, and of its nodes' slopes held (slopes)."""
+
+    group: Name = key("a group's name in quotes; of the mesh file or of [groups]")
+    fix: Axes = key('a list out of "x", "y", "z"; such as ["x", "y"]', ())
+    move: dict[Axis, float] = key("displacements by axis; such as { z = -0.025 }", {})
+    slopes: Axes = key('a list out of "x", "y", "z"; components of the slopes to hold, such as ["z"]', ())
+    ramp: RampKey = key('a ramp; such as "cosine"', "linear")
+
+    @model_validator(mode="after")
+    def _check(self) -> ConstraintSpec:
+        if not self.fix and not self.move and not self.slopes:
+            raise problem(
+                "neither fix nor move nor slopes",
+                expected="one of them at least",
+                cure='such as fix = ["x", "y", "z"]',
+            )
+        both = [axis for axis in AXES if axis in self.fix and axis in self.move]
+        if both:
+            raise problem(
+                f"{both[0]} is fixed and moved",
+                at=["move"],
+                got=self.move,
+                expected="one of both",
+                cure="drop one",
+            )
+        return self
+
+
+class GravitySpec(Table):
+    """One [[load]] of type gravity, on everything that has mass."""
+
+    type: Literal["gravity"]
+    acceleration: Vector = key("three numbers; such as [0.0, 0.0, -9.81]")
+    ramp: RampKey = key('a ramp; such as "cosine"', "linear")
+
+
+class ForceSpec(Table):
+    """One [[load]] of type force: dead, spread over the group by the shape functions."""
+
+    type: Literal["force"]
+    group: Name = key("a group's name in quotes; of the mesh file or of [groups]")
+    total: Vector = key("three numbers; the whole force on the group, such as [0.0, 0.0, -120.0]")
+    ramp: RampKey = key('a ramp; such as "cosine"', "linear")
+
+
+LoadSpec = Annotated[GravitySpec | ForceSpec, Field(discriminator="type")]
+
+
+class CurveSpec(Table):
+    """output.curve: what the columns force and stroke mean."""
+
+    force: DirectionKey = key('"group.axis"; such as "top.z"')
+    stroke: DirectionKey = key('"group.axis"; such as "top.z"')
+
+
+class OutputSpec(Table):
+    """[output]."""
+
+    symmetry: float = key("a number > 0; 4 for a quarter of the body", 1.0, gt=0)
+    curve: CurveSpec | None = key('a table; such as { force = "top.z", stroke = "top.z" }', None)
+
+
+class ProbeSpec(Table):
+    """One [[probe]]: the mean position of a group."""
+
+    name: Name = key("a name in quotes; it heads the columns of probes.csv")
+    group: Name = key("a group's name in quotes; of the mesh file or of [groups]")
+    mean: Literal["nodes", "area"] = key("a kind of mean", "nodes")
+
+
+class SectionSpec(Table):
+    """[section], for plane elements and beams."""
+
+    thickness: float | None = key("a number > 0", None, gt=0)
+    plane: Literal["stress", "strain"] | None = key("a kind of plane state", None)
+    area: float | None = key("a number > 0", None, gt=0)
+    inertia: float | None = key("a number > 0; the second moment of area", None, gt=0)
+
+
+class CaseSpec(Table):
+    """A whole case file."""
+
+    format: Literal[1] = key("1; this program reads format 1", 1)
+    title: str = key('a title in quotes; such as title = "Block under compression"')
+    units: str = key("a label in quotes; for plots, nothing is converted", "SI")
+    note: str = key("a remark in quotes; it stands under every picture", "")
+    mesh: MeshSpec = key("a table [mesh]; with file and element")
+    groups: dict[Name, GroupSpec] = key("a table [groups]; of choices by geometry", {})
+    material: tuple[MaterialSpec, ...] = key("a table [material]; or several [[material]]")
+    constraint: tuple[ConstraintSpec, ...] = key("tables; write [[constraint]]", ())
+    load: tuple[LoadSpec, ...] = key("tables; write [[load]]", ())
+    statics: StaticsSpec | None = key("a table [statics]", None)
+    dynamics: DynamicsSpec | None = key("a table [dynamics]", None)
+    initial: InitialSpec | None = key("a table [initial]", None)
+    output: OutputSpec = Field(default_factory=OutputSpec, description="a table [output]")
+    probe: tuple[ProbeSpec, ...] = key("tables; write [[probe]]", ())
+    petsc: dict[Name, str | int | float | bool] = key(
+        'an option with its value, without the leading dash; such as ksp_type = "cg"', {}
+    )
+    section: SectionSpec | None = key("a table [section]", None)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _motion_ramps(cls, data: Any) -> Any:
+        """In motion loads act from the start and moves begin and end at rest, unless the case says more."""
+        if not (isinstance(data, dict) and "dynamics" in data):
+            return data
+        defaults = {"constraint": "cosine", "load": "constant"}
+        filled = {
+            name: tuple({"ramp": ramp, **row} if isinstance(row, dict) else row for row in data[name])
+            for name, ramp in defaults.items()
+            if isinstance(data.get(name), tuple)
+        }
+        return {**data, **filled}
+
+    @model_validator(mode="after")
+    def _check(self) -> CaseSpec:
+        if found := problems(self):
+            first = found[0].context or {}
+            raise problem(
+                first["what"],
+                at=first["at"],
+                got=first["got"],
+                expected=first["expected"],
+                cure=first["cure"],
+                more=len(found) - 1,
+            )
+        return self
+
+
+__all__ = [
+    "LAWS",
+    "CaseSpec",
+    "ConstraintSpec",
+    "CriticalMode",
+    "CurveSpec",
+    "Direction",
+    "DynamicsSpec",
+    "ForceSpec",
+    "GravitySpec",
+    "GroupSpec",
+    "InitialSpec",
+    "LoadSpec",
+    "MaterialSpec",
+    "MeshSpec",
+    "OutputSpec",
+    "ProbeSpec",
+    "SectionSpec",
+    "StaticsSpec",
+]

@@ -1,0 +1,114 @@
+"""The mass of the body: one number per pair of nodal vectors that share a cell, constant in time.
+
+Consistent, m_ab = ∫ rho N_a N_b dV by the element's exact rule, or lumped: the diagonal scaled to the
+whole mass, which for linear tetrahedra and bricks are the row sums.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ancf_petsc.element.element import Element
+from ancf_petsc.kernel.constant import add_mass, mass_product
+from ancf_petsc.kernel.tables import turn_functions
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.model.matrix import Matrix
+from ancf_petsc.parallel.exchange import combined
+
+CHUNK = 1000
+"""Cells whose mass matrices are looked at together."""
+
+
+class Mass:
+    """The mass matrix of an assembly's owned rows.
+
+    values (nnz,): one number per entry of `assembly.graph`. diagonal (n,).
+    """
+
+    def __init__(self, assembly: Assembly, *, lumped: bool = False) -> None:
+        self.assembly = assembly
+        self.comm = assembly.comm
+        self.lumped = lumped
+        model, (pointers, columns) = assembly.model, assembly.graph
+        self._slot = model.element.slot.astype(np.int32)
+        self._shape = mean_products(model.element)
+        self.values = np.zeros(len(columns))
+        for region in model.regions:
+            cell_mass = (region.density or 0.0) * model.volumes
+            add_mass(
+                model.cells,
+                cell_mass,
+                self._shape,
+                self._slot,
+                model.slope_maps,
+                lumped,
+                region.first,
+                region.last,
+                pointers,
+                columns,
+                self.values,
+            )
+        rows = np.repeat(np.arange(model.owned), np.diff(pointers))
+        self.diagonal = self.values[columns == rows]
+        self._field = np.zeros_like(model.reference)
+
+    @cached_property
+    def bounds(self) -> tuple[float, float]:
+        """Within which the eigenvalues of the matrix over its diagonal lie, whatever is held: those of
+        single cells (Wathen, IMA J. Numer. Anal. 7 (1987) 449). Collective.
+        """
+        maps, row = self.assembly.model.slope_maps, self.assembly.model.element
+        low, high = np.inf, 0.0
+        for chunk in np.array_split(maps, len(maps) // CHUNK + 1) if maps.shape[1] else [maps[:1]]:
+            half = np.stack([turn_functions(shape, chunk, row) for shape in self._shape], axis=1)
+            mass = np.stack([turn_functions(half[:, :, b], chunk, row) for b in range(row.functions)], axis=2)
+            scale = 1.0 / np.sqrt(np.einsum("eaa->ea", mass))
+            values = np.linalg.eigvalsh(scale[:, :, None] * mass * scale[:, None, :])
+            low, high = min(low, values.min(initial=np.inf)), max(high, values.max(initial=0.0))
+        return combined(self.comm, low, MPI.MIN), combined(self.comm, high, MPI.MAX)
+
+    def times(self, field: NDArray, into: NDArray | None = None) -> NDArray[np.float64]:
+        """Mass times a field (n, 3) on owned nodal vectors; driven ones are no exception. Collective."""
+        result = np.empty((self.assembly.model.owned, 3)) if into is None else into
+        mass_product(*self.assembly.graph, self.values, self.assembly.with_ghosts(field, self._field), result)
+        return result
+
+    def add_to(self, matrix: Matrix, factor: float = 1.0) -> None:
+        """Add factor times the mass to a matrix that is not finished yet."""
+        matrix.add_mass(self.values, factor)
+
+    def kinetic_energy(self, velocity: NDArray) -> float:
+        """Kinetic energy of the whole body. Collective."""
+        return combined(self.comm, 0.5 * float(np.vdot(velocity, self.times(velocity))))
+
+    def momenta(self, x: PETSc.Vec, velocity: NDArray) -> tuple[NDArray, NDArray]:
+        """Linear and angular momentum (3,), the latter about the origin. Collective."""
+        carried = self.times(velocity)
+        linear = carried[self.assembly.model.own_positions].sum(axis=0)
+        moments = x.array_r.reshape(-1, 3).T @ carried
+        angular = np.array([moments[i, j] - moments[j, i] for i, j in ((1, 2), (2, 0), (0, 1))])
+        both = combined(self.comm, np.concatenate((linear, angular)))
+        return both[:3], both[3:]
+
+    def centre(self) -> NDArray[np.float64]:
+        """Centre of mass (3,) of the undeformed body. Collective."""
+        model = self.assembly.model
+        uniform = np.zeros((model.owned, 3))
+        uniform[model.own_positions] = 1.0
+        share = self.times(uniform)[:, 0]
+        moment = share @ model.reference[: model.owned]
+        total = share[model.own_positions].sum()
+        sums = combined(self.comm, np.append(moment, total))
+        return sums[:3] / sums[3]
+
+
+def mean_products(element: Element) -> NDArray[np.float64]:
+    """Mean of N_a N_b over the reference cell (a, b), exact."""
+    tables = element.tables("mass")
+    weights = tables.weights / tables.weights.sum()
+    return np.einsum("q,qa,qb->ab", weights, tables.values, tables.values)

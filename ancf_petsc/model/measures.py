@@ -1,0 +1,73 @@
+"""What the tables say of a state: reactions, strokes, mean stresses, energies, probes. All functions are collective."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.parallel.exchange import combined
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class CurveChoice:
+    """Which group and component the columns `force` and `stroke` follow; area: undeformed, None for no surface."""
+
+    force_group: str
+    force_axis: int
+    stroke_group: str
+    stroke_axis: int
+    area: float | None
+
+
+def reaction(assembly: Assembly, out_of_balance: NDArray, group: str) -> NDArray[np.float64]:
+    """Sum (3,) over the group's nodes of Q - Q_e: what the support exerts on the body."""
+    own = out_of_balance[assembly.model.groups[group]].sum(axis=0)
+    return combined(assembly.comm, own)
+
+
+def mean_position(assembly: Assembly, x: PETSc.Vec, name: str) -> tuple[NDArray, NDArray]:
+    """Weighted mean position (3,) of a group's nodes and its displacement (3,)."""
+    vectors, weights = assembly.model.means[name]
+    now = weights @ x.array_r.reshape(-1, 3)[vectors]
+    before = weights @ assembly.model.reference[vectors]
+    now, before = combined(assembly.comm, np.stack((now, before)))
+    return now, now - before
+
+
+def mean_stress(assembly: Assembly, cauchy: NDArray, group: str, axis: int) -> float:
+    """Cauchy stress (axis, axis), averaged to nodes by undeformed volume, mean over the group's nodes."""
+    model = assembly.model
+    a = model.cells.shape[1]
+    weight = np.repeat(model.volumes, a)
+    stress = np.repeat(model.volumes * cauchy[:, 4 * axis], a)
+    n = len(model.reference)
+    volumes = np.bincount(model.cells.ravel(), weight, minlength=n)
+    sums = np.bincount(model.cells.ravel(), stress, minlength=n)
+    nodes = model.groups[group]
+    own = np.array([(sums[nodes] / volumes[nodes]).sum(), len(nodes)])
+    total, count = combined(assembly.comm, own)
+    return total / count
+
+
+def conjugates(assembly: Assembly, x: PETSc.Vec, out_of_balance: NDArray) -> tuple[NDArray, NDArray]:
+    """What the work hangs on: the reaction of each motion (m,) and the displacement each load sees (l,)."""
+    model = assembly.model
+    values = out_of_balance.ravel()[assembly.driven]
+    reactions = np.bincount(assembly.driven_motion, values, minlength=len(model.motions))
+    displacement = x.array_r.reshape(-1, 3) - model.reference[: model.owned]
+    seen = np.array([float((load.pattern * displacement).sum()) for load in model.loads])
+    both = combined(assembly.comm, np.concatenate((reactions, seen)))
+    return both[: len(model.motions)], both[len(model.motions) :]
+
+
+def von_mises(cauchy: NDArray) -> NDArray[np.float64]:
+    """Von Mises stress (e,) from Cauchy stress (e, 9)."""
+    xx, xy, xz, _, yy, yz, _, _, zz = cauchy.T
+    normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+    return np.sqrt(normal / 2 + 3 * (xy**2 + yz**2 + xz**2))

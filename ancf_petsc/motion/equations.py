@@ -1,0 +1,151 @@
+"""The equations of motion M (q'' + alpha q') + Q(q) = Q_e(t), Olshevskiy et al. (2017), Eqs. (13) and (16).
+
+Driven degrees of freedom follow their ramps; s = t / duration. Where a ramp has a corner their velocity
+jumps, and with the consistent mass the free nodes beside them get their share of the impulse.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.model.mass import Mass
+from ancf_petsc.motion.fused import FusedMotion
+from ancf_petsc.motion.mass_solver import MassSolver
+from ancf_petsc.parallel.exchange import combined
+
+
+class Equations:
+    """Forces and accelerations of a body in motion. damping: alpha in 1 / unit of time."""
+
+    def __init__(self, assembly: Assembly, mass: Mass, damping: float, duration: float) -> None:
+        self.assembly = assembly
+        self.comm = assembly.comm
+        self.mass = mass
+        self.damping = damping
+        self.duration = duration
+        self.solver = MassSolver(mass)
+        model = assembly.model
+        self.moving = any(motion.amplitude for motion in model.motions)
+        self.corners = sorted(
+            {s * duration for motion in model.motions if motion.amplitude for s in motion.ramp.corners()}
+            | {s * duration for load in model.loads for s in load.ramp.corners()}
+        )
+        self._piece_end = self._end_of_piece(0.0)
+        self._steady = all(load.ramp.kind == "constant" for load in model.loads)
+        self._loads = assembly.external_force(0.0)
+
+    @cached_property
+    def fused(self) -> FusedMotion | None:
+        """The motion in compiled loops, where the body is simple enough."""
+        if not FusedMotion.fits(self.mass, self.solver, moving=self.moving):
+            return None
+        return FusedMotion(self.mass, self.solver, self.damping, self.duration)
+
+    # --- what is prescribed
+
+    def loads(self, t: float) -> NDArray[np.float64]:
+        """Dead loads (n, 3) on the owned nodal vectors."""
+        return self._loads if self._steady else self.assembly.external_force(t / self.duration)
+
+    def driven_positions(self, t: float) -> NDArray[np.float64]:
+        """Of the driven degrees of freedom (c,), in the order of `assembly.driven`."""
+        values = [motion.value(t / self.duration) for motion in self.assembly.model.motions]
+        reference = self.assembly.model.reference.ravel()[self.assembly.driven]
+        return reference + np.array(values or [0.0])[self.assembly.driven_motion]
+
+    def driven_velocities(self, t: float) -> NDArray[np.float64]:
+        """Of the driven degrees of freedom (c,); at the end of a smooth piece those it ends with."""
+        s = min(t / self.duration, self._piece_end)
+        rates = [
+            motion.amplitude * motion.ramp.rate(s) / self.duration for motion in self.assembly.model.motions
+        ]
+        return np.array(rates or [0.0])[self.assembly.driven_motion]
+
+    def driven_accelerations(self, t: float) -> NDArray[np.float64]:
+        """Of the driven degrees of freedom (c,)."""
+        s = min(t / self.duration, self._piece_end)
+        rates = [
+            motion.amplitude * motion.ramp.curvature(s) / self.duration**2
+            for motion in self.assembly.model.motions
+        ]
+        return np.array(rates or [0.0])[self.assembly.driven_motion]
+
+    def place(self, x: PETSc.Vec, v: PETSc.Vec, t: float) -> None:
+        """Put the driven degrees of freedom of a state where they belong."""
+        driven = self.assembly.driven
+        if len(driven):
+            x.array[driven] = self.driven_positions(t)
+            v.array[driven] = self.driven_velocities(t)
+
+    def pass_corner(self, t: float, v: PETSc.Vec) -> None:
+        """Enter the smooth piece after t. Velocities of driven nodes may jump: v then holds those after the
+        impulse.
+        """
+        if not self.moving:
+            self._piece_end = self._end_of_piece(t)
+            return
+        driven = self.assembly.driven
+        jump = np.zeros((self.assembly.model.owned, 3))
+        before = self.driven_velocities(t)
+        self._piece_end = self._end_of_piece(t)
+        jump.ravel()[driven] = self.driven_velocities(t) - before
+        if not combined(self.comm, float(np.abs(jump).max(initial=0.0))):
+            return
+        change = jump - self.solver.solve(self.mass.times(jump))
+        v.array[:] += change.ravel()
+
+    def _end_of_piece(self, t: float) -> float:
+        """The last s before the next corner."""
+        ahead = next((corner for corner in self.corners if corner > t), self.duration)
+        return float(np.nextafter(ahead / self.duration, 0.0))
+
+    # --- what follows
+
+    def acceleration(self, t: float, x: PETSc.Vec, v: NDArray) -> NDArray[np.float64]:
+        """q'' (n, 3) of a state whose driven degrees of freedom are in place; v (n, 3). Collective."""
+        force = self.loads(t) - self.assembly.internal_force(x)[0]
+        driven = self.assembly.driven
+        if not self.moving:
+            result = self.solver.solve(force)
+            if self.damping:
+                result -= self.damping * v
+                result.ravel()[driven] = 0.0
+            return result
+        given = np.zeros_like(force)
+        accelerations = self.driven_accelerations(t)
+        given.ravel()[driven] = accelerations + self.damping * v.ravel()[driven]
+        result = self.solver.solve(force - self.mass.times(given)) - self.damping * v
+        result.ravel()[driven] = accelerations
+        return result
+
+    def out_of_balance(self, t: float, x: PETSc.Vec, v: NDArray, a: NDArray) -> NDArray[np.float64]:
+        """M (q'' + alpha q') + Q - Q_e (n, 3): reactions where driven. Collective."""
+        inertia = self.mass.times(a + self.damping * v)
+        return inertia + self.assembly.internal_force(x)[0] - self.loads(t)
+
+    def highest_frequency(self, x: PETSc.Vec, iterations: int = 30) -> float:
+        """Estimate of the largest omega of M^-1 K at x in rad / unit of time, some percent on the safe
+        side. Collective.
+
+        Power iteration approaches it from below, to 3 % on the meshes tried: 5 % are added.
+        """
+        model, n = self.assembly.model, self.assembly.model.owned
+        seed = model.numbering.file_nodes[:n, None] * 3.0 + np.arange(3)
+        field = self.solver.free * np.sin(12.9898 * seed + 1.0)
+        direction, omega = self.assembly.vector(), 0.0
+        for _ in range(iterations):
+            carried = self.mass.times(field)
+            length = np.sqrt(combined(self.comm, float(np.vdot(field, carried))))
+            if length == 0.0:
+                break
+            direction.array[:] = (field / length).ravel()
+            field = self.solver.solve(self.assembly.tangent_product(x, direction))
+            along = combined(self.comm, float(np.vdot(field, carried))) / length
+            omega = float(np.sqrt(max(along, 0.0)))
+        direction.destroy()
+        return 1.05 * omega

@@ -1,0 +1,107 @@
+"""What an integrator is: PETSc's TS behind one method, `advance`."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ancf_petsc.errors import MotionStopped
+from ancf_petsc.motion.equations import Equations
+
+SHORTEST = 1e-13  # of the duration: a step so short does not move the clock reliably
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a case may set. step: 0 where the method chooses its steps by `tolerance`."""
+
+    step: float = 0.0
+    tolerance: float = 0.0
+    spectral_radius: float = 0.8
+    theta: float = 0.5
+    order: int = 2
+
+
+@dataclass(frozen=True)
+class Step:
+    """An accepted step, or `count` of them at once. known: external work and loss in it, where the method has
+    them exactly.
+    """
+
+    time: float
+    size: float
+    newton: int = 0
+    linear: int = 0
+    rejected: int = 0
+    known: tuple[float, float] | None = None
+    count: int = 1
+
+
+class Integrator(ABC):
+    """Moves the state: time, x and v (PETSc vectors), and a (n, 3) where the method carries accelerations.
+
+    A subclass sets `self.ts` up and says what a step does to the state.
+    """
+
+    name: str
+    highest_stable: float | None = None  # omega h of explicit methods for undamped bodies
+
+    def __init__(self, equations: Equations, settings: Settings, x: PETSc.Vec, v: PETSc.Vec) -> None:
+        self.equations = equations
+        self.settings = settings
+        self.time = 0.0
+        self.x, self.v = x, v
+        self.a: NDArray[np.float64] = np.zeros((0, 3))
+        self.ts = PETSc.TS().create(equations.comm)
+        self.ts.setMaxTime(1e300)
+        self.ts.setMaxSteps(2**31 - 1)
+        self.ts.setExactFinalTime(PETSc.TS.ExactFinalTime.STEPOVER)
+        self.ts.setErrorIfStepFails(False)
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether the method chooses its steps."""
+        return self.settings.step == 0.0
+
+    @property
+    def leaps(self) -> bool:
+        """Whether `advance` goes on to its goal by itself, in one call or several."""
+        return self.adaptive
+
+    @property
+    def longest_stable(self) -> float | None:
+        """The longest stable fixed step of an explicit method; None for implicit ones."""
+        return None
+
+    @abstractmethod
+    def advance(self, goal: float) -> Step:
+        """One step: to `goal`, or, where the method leaps, at most to `goal`. Raises MotionStopped."""
+
+    def restart(self) -> None:
+        """Forget what was before: the velocity jumped. The state has been set."""
+        self.ts.restartStep()
+
+    def set_solver_up(self) -> None:
+        """Set the solvers up on the undeformed body, so that every option has been asked for."""
+        self.ts.setUp()
+
+    def describe(self) -> str:
+        """The method in words."""
+        how = f"tolerance {self.settings.tolerance:g}" if self.adaptive else "fixed step"
+        return f"{self.name}, {how}"
+
+    def destroy(self) -> None:
+        """Free PETSc's objects; a TS that is left to Python's end can crash it."""
+        self.ts.destroy()
+
+    def failed(self, goal: float, why: str) -> MotionStopped:
+        """The error of a step that failed."""
+        cure = "a smaller tolerance" if self.adaptive else "a smaller dynamics.step"
+        hint = "" if self.name == "energy_momentum" else ', or integrator = "energy_momentum"'
+        return MotionStopped(
+            f"{self.name} cannot go on from time {self.time:.6g} to {goal:.6g}: {why}; try {cure}{hint}"
+        )

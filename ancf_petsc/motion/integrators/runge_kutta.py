@@ -1,0 +1,81 @@
+"""Explicit Runge-Kutta methods of PETSc: 5dp (Dormand and Prince 1980, the paper's ode45) and the classical
+one of order 4. Under loads that stay, steps of 5dp that adapt are made in one compiled loop where the body is simple
+enough and no option speaks of TS; it is PETSc's pair with PETSc's control.
+"""
+
+from __future__ import annotations
+
+from petsc4py import PETSc
+
+from ancf_petsc.kernel.adaptive import NOT_FINITE, TOO_SHORT
+from ancf_petsc.motion.equations import Equations
+from ancf_petsc.motion.fused import FusedMotion
+from ancf_petsc.motion.integrators.base import SHORTEST, Settings, Step
+from ancf_petsc.motion.integrators.first_order import SPEED_CHANGE, FirstOrder
+from ancf_petsc.solve.petsc import begins_a_given_option, default_options
+
+
+class RungeKutta5dp(FirstOrder):
+    """Order 5; grows the motion of undamped bodies by less than 1e-3 a step up to omega h = 1.3."""
+
+    name = "runge_kutta_5dp"
+    table = "5dp"
+    highest_stable = 1.0
+
+    def __init__(self, equations: Equations, settings: Settings, x: PETSc.Vec, v: PETSc.Vec) -> None:
+        super().__init__(equations, settings, x, v)
+        self.ts.setType(PETSc.TS.Type.RK)
+        self.ts.setRKType(self.table)
+        self.ts.setRHSFunction(self._rates, self.y.duplicate())
+        self.highest_frequency = equations.highest_frequency(x)
+        with default_options({"ts_adapt_type": "basic" if self.adaptive else "none"}):
+            self.ts.setFromOptions()
+        self.begin(self.longest_stable)
+        fused, free = equations.fused, not begins_a_given_option("ts_")
+        fits = fused is not None and fused.steady and free and self.adaptive and self.table == "5dp"
+        self._fused = fused if fits else None
+
+    def advance(self, goal: float) -> Step:
+        return super().advance(goal) if self._fused is None else self._leap(goal, self._fused)
+
+    def _leap(self, goal: float, fused: FusedMotion) -> Step:
+        tolerance, before = self.settings.tolerance, self.time
+        position = tolerance * self.equations.assembly.model.size
+        span = (self.time, goal, SHORTEST * self.equations.duration)
+        done = fused.leap(
+            self.y.array, span, (self._proposed, self._speed, position, tolerance, SPEED_CHANGE)
+        )
+        if done.status == NOT_FINITE:
+            raise self.failed(goal, "numbers are not finite any more")
+        if done.status == TOO_SHORT:
+            raise self.failed(goal, "steps have become too short to move on")
+        self.time, self._proposed, self._speed = done.time, done.proposed, done.speed
+        self._store()
+        known, count = (done.work, done.loss), done.steps
+        return Step(self.time, self.time - before, rejected=done.rejected, known=known, count=count)
+
+    @property
+    def longest_stable(self) -> float:
+        """The longest stable fixed step, by the largest frequency of the undeformed body."""
+        omega = self.highest_frequency
+        return self.highest_stable / omega if omega else self.equations.duration
+
+    def _rates(self, ts: PETSc.TS, t: float, y: PETSc.Vec, f: PETSc.Vec) -> None:
+        if self.equations.fused is not None:
+            self.equations.fused.rates(t, y.array_r, f.array_w)
+            return
+        x, v = self.stage(y, t)
+        a = self.equations.acceleration(t, x, v)
+        rates = f.array
+        rates[: self._own], rates[self._own :] = v.ravel(), a.ravel()
+        if self.equations.moving:
+            driven = self.equations.assembly.driven
+            rates[driven] = rates[self._own + driven] = 0.0
+
+
+class RungeKutta4(RungeKutta5dp):
+    """Order 4, four stages; the wider limit of the two."""
+
+    name = "runge_kutta_4"
+    table = "4"
+    highest_stable = 2.8

@@ -1,0 +1,1 @@
+"""The linear solver of tangents and its preconditioner."""
