@@ -27,16 +27,15 @@ from numba.extending import register_jitable
 
 PACKAGE = Path(__file__).parent
 SOURCES = ("algebra", "kernel", "material")
-NAMING = 2  # of functions, as this module does it: machine code of other versions is not used
 
 
 def source_hash() -> str:
-    """Hash of every file that machine code is made from, of the compiler, and of how functions are named."""
-    digest = hashlib.sha256(f"{numba.__version__} {numpy.__version__} {NAMING} {PACKAGE}".encode())
-    for folder in SOURCES:
-        for file in sorted((PACKAGE / folder).glob("*.py")):
-            digest.update(file.name.encode())
-            digest.update(file.read_bytes())
+    """Hash of every file that machine code is made from, of this module and the compiler."""
+    digest = hashlib.sha256(f"{numba.__version__} {numpy.__version__} {PACKAGE}".encode())
+    files = (file for folder in SOURCES for file in sorted((PACKAGE / folder).glob("**/*.py")))
+    for file in (Path(__file__), *files):
+        digest.update(str(file.relative_to(PACKAGE)).encode())
+        digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -17,12 +17,7 @@ from ancf_petsc.algebra.graph import block_starts, neighbours
 from ancf_petsc.bench.yardstick import timed
 from ancf_petsc.element.catalog import element
 from ancf_petsc.kernel.choice import way_of
-<<<<<<< HEAD
-from ancf_petsc.algebra.graph import block_starts, neighbours
 from ancf_petsc.kernel.samples import one_cell
-=======
-from ancf_petsc.kernel.warmup import one_cell
->>>>>>> house
 from ancf_petsc.material.models import LAWS
 
 COMPILING = """
