@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -17,6 +18,52 @@ Program = Callable[..., subprocess.CompletedProcess[str]]
 # The machine's load must not decide whether a test passes.
 settings.register_profile("project", deadline=None)
 settings.load_profile("project")
+
+
+MACHINE_CODE = "machine_code"  # in pytest's cache folder
+FILL = """
+import sys
+from ancf_petsc.element.catalog import element
+from ancf_petsc.jit import CACHE_FOLDER
+from ancf_petsc.kernel.warmup import compile_kernels
+from ancf_petsc.material.models import LAWS
+for code in ("3413", "3-10-1-3", "1222"):
+    compile_kernels(element(code), [LAWS[sys.argv[1]]], mean=True, moving=True)
+"""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Give the suite a cache for machine code of its own, which two processes fill that know one law each."""
+    if "PYTEST_XDIST_WORKER" in os.environ:  # the main process has set it
+        return
+    folder = Path(config.cache.mkdir(MACHINE_CODE))
+    os.environ["ANCF_CACHE_DIR"] = str(folder)
+    if config.args == config.getini("testpaths") and not config.option.collectonly:
+        fill(folder)
+
+
+def fill(folder: Path) -> None:
+    """Compile all kernels, each law in a process of its own; what earlier versions left goes."""
+    from ancf_petsc.jit import source_hash
+
+    present = folder / "ancf_petsc" / f"kernels-{source_hash()}"
+    mark = present / "filled_by_a_process_for_each_law"
+    if mark.exists():
+        return
+    shutil.rmtree(folder / "ancf_petsc", ignore_errors=True)
+    environment = os.environ | {"ANCF_CACHE_DIR": str(folder)}
+    command = [sys.executable, "-c", FILL]
+    processes = [subprocess.Popen([*command, law], env=environment) for law in ("svk", "neo_hooke")]
+    assert [process.wait() for process in processes] == [0, 0]
+    mark.touch()
+
+
+@pytest.fixture(scope="session")
+def machine_code(pytestconfig: pytest.Config) -> Path:
+    """A cache for machine code that two processes filled, each of which knew one law."""
+    folder = Path(pytestconfig.cache.mkdir(MACHINE_CODE))
+    fill(folder)
+    return folder
 
 
 @pytest.fixture(scope="session")
