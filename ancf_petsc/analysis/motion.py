@@ -19,8 +19,8 @@ from ancf_petsc.input.schema import InitialSpec
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.mass import Mass
 from ancf_petsc.motion.equations import Equations
-from ancf_petsc.motion.integration import steps_in, warn_of_long_step
-from ancf_petsc.motion.integrators import Settings, integrator
+from ancf_petsc.motion.integration import warn_of_long_step
+from ancf_petsc.motion.integrators import Settings, integrator, steps_in
 
 log = logging.getLogger("ancf")
 
@@ -89,7 +89,7 @@ class Motion:
         self, record: Record, clock: Clock, watch: Callable[[float], None], stop: Callable[[], bool]
     ) -> MotionRun:
         """The run, ready to go."""
-        return MotionRun(self, record, clock, watch, stop)
+        return MotionRun(self.integrator, self.times, record, clock, watch, stop)
 
     def destroy(self) -> None:
         """Free PETSc's objects."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,34 +16,32 @@ from ancf_petsc.log import STEPS
 from ancf_petsc.model.measures import AXES, conjugates
 from ancf_petsc.model.motion_work import MotionWork, Powers
 from ancf_petsc.motion.integration import TimeIntegration
-from ancf_petsc.motion.integrators import Step
+from ancf_petsc.motion.integrators import Integrator, Step
 from ancf_petsc.parallel.exchange import combined
-
-if TYPE_CHECKING:
-    from ancf_petsc.analysis.motion import Motion
 
 COUNTS = ("newton_iterations", "linear_iterations", "steps", "rejected_steps")
 log = logging.getLogger(STEPS)
 
 
 class MotionRun:
-    """Follows a motion and records it. watch: told the part done, 0 to 1. stop: whether to end after this
-    step.
+    """Follows a motion and records it. times: of the outputs after the start. watch(part): called with the part done,
+    0 to 1. stop(): whether to end after this step.
     """
 
     def __init__(
         self,
-        motion: Motion,
+        integrator: Integrator,
+        times: Sequence[float],
         record: Record,
         clock: Clock,
         watch: Callable[[float], None],
         stop: Callable[[], bool],
     ) -> None:
         self.record, self.clock, self.watch = record, clock, watch
-        self.integrator, self.equations, self.mass = motion.integrator, motion.equations, motion.mass
-        self.assembly = motion.assembly
-        self.duration = motion.spec.duration
-        self.times = set(motion.times)
+        self.integrator, self.equations = integrator, integrator.equations
+        self.mass, self.assembly = self.equations.mass, self.equations.assembly
+        self.duration = self.equations.duration
+        self.times = set(times)
         self.totals = dict.fromkeys(COUNTS, 0)
         self._since = dict.fromkeys(COUNTS, 0)
         model = self.assembly.model
@@ -53,7 +50,7 @@ class MotionRun:
         self._kinetic = 0.0
         self._start_energy = 0.0
         self._begun = time.perf_counter()
-        self.path = TimeIntegration(self.integrator, motion.times, self._on_step, self._on_corner, stop)
+        self.path = TimeIntegration(integrator, times, self._on_step, self._on_corner, stop)
 
     def go(self) -> None:
         """To the end. Raises MotionStopped or Interrupted, with the last good state saved."""

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-from pydantic_core import PydanticCustomError
+from pydantic import ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from ancf_petsc.element import dncm
 from ancf_petsc.errors import CaseError
+from ancf_petsc.input.schema import CaseSpec, ConstraintSpec
 from ancf_petsc.input.types import Direction, Ramp, problem
 
-if TYPE_CHECKING:
-    from ancf_petsc.input.schema import CaseSpec, ConstraintSpec
-
 Problems = Iterator[PydanticCustomError]
+
+
+def check(spec: CaseSpec) -> None:
+    """Raise ValidationError with the first of the problems, which says how many others there are."""
+    found = problems(spec)
+    if not found:
+        return
+    context = found[0].context or {}
+    first = problem(**{**context, "more": len(found) - 1})
+    raise ValidationError.from_exception_data("case", [InitErrorDetails(type=first, loc=(), input=None)])
 
 
 def problems(spec: CaseSpec) -> list[PydanticCustomError]:

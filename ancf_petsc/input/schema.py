@@ -1,7 +1,7 @@
 """The case file, format 1: every table with its keys, defaults and limits. docs/case-format.md is for users.
 
-Each key carries its expectation in words; input/messages.py makes a user's message of it. Checks across
-tables are in input/checks.py.
+Each key carries its expectation in words; input/messages.py makes a user's message of it. What must hold between tables
+is in input/checks.py.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from ancf_petsc.input.analysis import (
     InitialSpec,
     StaticsSpec,
 )
-from ancf_petsc.input.checks import problems
 from ancf_petsc.input.types import (
     AXES,
     Axes,
@@ -207,20 +206,6 @@ class CaseSpec(Table):
             if isinstance(data.get(name), tuple)
         }
         return {**data, **filled}
-
-    @model_validator(mode="after")
-    def _check(self) -> CaseSpec:
-        if found := problems(self):
-            first = found[0].context or {}
-            raise problem(
-                first["what"],
-                at=first["at"],
-                got=first["got"],
-                expected=first["expected"],
-                cure=first["cure"],
-                more=len(found) - 1,
-            )
-        return self
 
 
 __all__ = [

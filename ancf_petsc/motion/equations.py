@@ -6,15 +6,12 @@ jumps, and with the consistent mass the free nodes beside them get their share o
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.mass import Mass
-from ancf_petsc.motion.fused import FusedMotion
 from ancf_petsc.motion.mass_solver import MassSolver
 from ancf_petsc.parallel.exchange import combined
 
@@ -38,13 +35,6 @@ class Equations:
         self._piece_end = self._end_of_piece(0.0)
         self._steady = all(load.ramp.kind == "constant" for load in model.loads)
         self._loads = assembly.external_force(0.0)
-
-    @cached_property
-    def fused(self) -> FusedMotion | None:
-        """The motion in compiled loops, where the body is simple enough."""
-        if not FusedMotion.fits(self.mass, self.solver, moving=self.moving):
-            return None
-        return FusedMotion(self.mass, self.solver, self.damping, self.duration)
 
     # --- what is prescribed
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +13,14 @@ from petsc4py import PETSc
 
 from ancf_petsc.errors import MotionStopped
 from ancf_petsc.motion.equations import Equations
+from ancf_petsc.motion.fused import FusedMotion, fused_motion
 
 SHORTEST = 1e-13  # of the duration: a step so short does not move the clock reliably
+
+
+def steps_in(interval: float, step: float) -> int:
+    """The fewest equal steps, none longer than `step`, that fill an interval."""
+    return max(1, ceil(interval / step * (1 - 1e-9)))
 
 
 @dataclass(frozen=True)
@@ -62,10 +70,20 @@ class Integrator(ABC):
         self.ts.setExactFinalTime(PETSc.TS.ExactFinalTime.STEPOVER)
         self.ts.setErrorIfStepFails(False)
 
+    @cached_property
+    def fused(self) -> FusedMotion | None:
+        """The motion in compiled loops, where the body is simple enough."""
+        return fused_motion(self.equations)
+
     @property
     def adaptive(self) -> bool:
         """Whether the method chooses its steps."""
         return self.settings.step == 0.0
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether steps are made in compiled loops."""
+        return False
 
     @property
     def leaps(self) -> bool:

@@ -17,9 +17,8 @@ from ancf_petsc.kernel.implicit import Scheme
 from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.fused_newton import FusedNewton
-from ancf_petsc.motion.integration import steps_in
-from ancf_petsc.motion.integrators.base import Integrator, Settings, Step
-from ancf_petsc.motion.integrators.increment import Forces
+from ancf_petsc.motion.increment import Forces
+from ancf_petsc.motion.integrators.base import Integrator, Settings, Step, steps_in
 from ancf_petsc.motion.integrators.one_step import OneStep
 
 
@@ -35,18 +34,21 @@ class GeneralizedAlpha(OneStep):
         self.beta = 0.25 * (1 + self.alpha_m - self.alpha_f) ** 2
         super().__init__(equations, settings, x, v)
         self._still = np.zeros((0, 3))
-        self._fused: FusedNewton | None = None
-        fused = equations.fused
-        if fused is not None and FusedNewton.fits(equations, self.solver):
-            self._fused = FusedNewton(fused, equations, self.solver)
+        self._newton: FusedNewton | None = None
+        if self.fused is not None and FusedNewton.fits(self.solver):
+            self._newton = FusedNewton(self.fused, equations, self.solver)
         self.restart()
 
     @property
+    def is_compiled(self) -> bool:
+        return self._newton is not None
+
+    @property
     def leaps(self) -> bool:
-        return self._fused is not None
+        return self.is_compiled
 
     def advance(self, goal: float) -> Step:
-        return super().advance(goal) if self._fused is None else self._leap(goal, self._fused)
+        return super().advance(goal) if self._newton is None else self._leap(goal, self._newton)
 
     def restart(self) -> None:
         self.a = self.equations.acceleration(self.time, self.x, self.v.array_r.reshape(-1, 3))
@@ -119,7 +121,7 @@ class GeneralizedAlpha(OneStep):
         return Step(self.time, size * (done + 1), newton, linear, count=done + 1)
 
     def describe(self) -> str:
-        if self._fused is not None:
+        if self._newton is not None:
             how = f"{Integrator.describe(self)}, compiled Newton + cholesky, {self.solver.linear.dof} degrees of freedom"
             return f"{how}, spectral radius {self.settings.spectral_radius:g}"
         return f"{super().describe()}, spectral radius {self.settings.spectral_radius:g}"

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.motion.equations import Equations
+from ancf_petsc.motion.increment import MOST_ITERATIONS, ForceTest
 from ancf_petsc.motion.integrators.base import Settings
 from ancf_petsc.motion.integrators.first_order import FirstOrder
-from ancf_petsc.motion.integrators.increment import MOST_ITERATIONS, ForceTest
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.linear.solver import LinearSolver
 from ancf_petsc.solve.petsc import default_options
