@@ -16,7 +16,9 @@ def modules():
     trees = {}
     for file in sorted(PACKAGE.rglob("*.py")):
         parts = (PACKAGE.name, *file.relative_to(PACKAGE).with_suffix("").parts)
-        trees[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = ast.parse(file.read_text(encoding="utf-8"))
+        trees[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = ast.parse(
+            file.read_text(encoding="utf-8")
+        )
     return trees
 
 

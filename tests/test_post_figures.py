@@ -14,7 +14,7 @@ from ancf_petsc.cli import main
 from ancf_petsc.post import figures
 from ancf_petsc.post.reference import read_level, read_reference
 from ancf_petsc.results.reader import open_results
-from ancf_petsc.results.tables import Table
+from ancf_petsc.results.tables import CsvTable
 
 mpl.use("Agg")
 
@@ -58,7 +58,7 @@ def _close_figures():
 
 
 def _write(path, columns):
-    with Table(path, list(columns)) as table:
+    with CsvTable(path, list(columns)) as table:
         for row in zip(*columns.values(), strict=True):
             table.append(row)
 

@@ -1,4 +1,4 @@
-"""From the root rank's blueprint to the model on every rank."""
+"""From the root rank's plan to the model on every rank."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ancf_petsc.model.ramp import make_ramp
 from ancf_petsc.parallel.exchange import agree, lookup, on_root, scatter_rows
 from ancf_petsc.parallel.numbering import Numbering, distribute, with_vectors
 from ancf_petsc.parallel.slabs import slab_bounds
-from ancf_petsc.plan.plan import Blueprint, draw
+from ancf_petsc.plan.plan import Plan, make_plan
 
 
 @dataclass
@@ -60,13 +60,13 @@ class Built:
 
 def build(case: Case, comm: MPI.Comm) -> Built:
     """Read, check, distribute. Collective; an error on the root rank is raised on all."""
-    blueprint = on_root(comm, lambda: draw(case))
-    return build_from(case, blueprint, comm)
+    plan = on_root(comm, lambda: make_plan(case))
+    return build_from(case, plan, comm)
 
 
-def build_from(case: Case, blueprint: Blueprint | None, comm: MPI.Comm) -> Built:
-    """Distribute a blueprint, which the root rank holds. Collective."""
-    plan, row = blueprint, element(case.spec.mesh.element)
+def build_from(case: Case, plan: Plan | None, comm: MPI.Comm) -> Built:
+    """Distribute a plan, which the root rank holds. Collective."""
+    row = element(case.spec.mesh.element)
     space = plan.space if plan else None
     nodes = distribute(
         comm,
@@ -86,8 +86,8 @@ def build_from(case: Case, blueprint: Blueprint | None, comm: MPI.Comm) -> Built
         slots=rows(space.slots() if space else None),
         tables=(),
         regions=[],
-        motion=rows(plan.constraints.motion if plan else None),
-        motions=comm.bcast(plan.constraints.motions if plan else None),
+        drive=rows(plan.constraints.drive if plan else None),
+        drives=comm.bcast(plan.constraints.drives if plan else None),
         size=comm.bcast(plan.mesh.size if plan else None),
         cell_numbers=np.empty(0, np.int64),
     )
@@ -122,7 +122,7 @@ class _Rows:
         return {name: np.ascontiguousarray(together[:, k]) for k, name in enumerate(names)}
 
 
-def _enter_cells(case: Case, plan: Blueprint | None, model: Model) -> None:
+def _enter_cells(case: Case, plan: Plan | None, model: Model) -> None:
     """Sort this rank's cells by material, own ones first, and make the element tables and regions."""
     comm, numbering, spec = model.comm, model.numbering, case.spec
     both = (
@@ -181,7 +181,7 @@ def _parameters(row: Element, law: Law, material: MaterialSpec, spec: CaseSpec) 
     return plane_stress(parameters) if section and section.plane == "stress" else parameters
 
 
-def _enter_groups(plan: Blueprint | None, rows: _Rows, model: Model) -> None:
+def _enter_groups(plan: Plan | None, rows: _Rows, model: Model) -> None:
     """Nodes of the groups and weights of the means that this rank owns."""
     n = model.owned
     for name, inside in rows.columns(plan.members if plan else None).items():
@@ -191,7 +191,7 @@ def _enter_groups(plan: Blueprint | None, rows: _Rows, model: Model) -> None:
         model.means[name] = (vectors, weights[vectors])
 
 
-def _enter_loads(case: Case, plan: Blueprint | None, rows: _Rows, model: Model) -> None:
+def _enter_loads(case: Case, plan: Plan | None, rows: _Rows, model: Model) -> None:
     """Patterns of all loads on owned nodes."""
     shares = rows.columns(plan.shares if plan else None)
     default = "linear" if case.spec.statics else "constant"
@@ -217,7 +217,7 @@ def nodal_mass(model: Model) -> NDArray[np.float64]:
     return sums[: model.owned].astype(float)
 
 
-def _file_order(plan: Blueprint | None, rows: _Rows, model: Model) -> FileOrder:
+def _file_order(plan: Plan | None, rows: _Rows, model: Model) -> FileOrder:
     """Slabs of the mesh as the file has it, nodes no element uses included."""
     comm, mesh = model.comm, plan.mesh if plan else None
     drawing = draw_cells(mesh, plan.element) if mesh and plan else None

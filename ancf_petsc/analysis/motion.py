@@ -25,7 +25,7 @@ from ancf_petsc.motion.integrators import Settings, integrator, steps_in
 log = logging.getLogger("ancf")
 
 
-class Motion:
+class MotionAnalysis:
     """A body ready to move. times: of the outputs after the start."""
 
     def __init__(self, case: Case, built: Built) -> None:

@@ -45,7 +45,7 @@ class MotionRun:
         self.totals = dict.fromkeys(COUNTS, 0)
         self._since = dict.fromkeys(COUNTS, 0)
         model = self.assembly.model
-        self.work = MotionWork(model.motions, model.loads, self.duration)
+        self.work = MotionWork(model.drives, model.loads, self.duration)
         self._ramped = any(load.ramp.kind != "constant" for load in model.loads)
         self._kinetic = 0.0
         self._start_energy = 0.0
@@ -84,7 +84,7 @@ class MotionRun:
         if step.known is not None:
             self.work.add_known(*step.known)
             return
-        often = self.equations.damping or self.equations.moving or self._ramped
+        often = self.equations.damping or self.equations.is_driven or self._ramped
         if often or step.time in self.times or step.time in self.path.corners:
             self.work.add(step.time, self._powers())
 
@@ -96,10 +96,10 @@ class MotionRun:
         """Loss, and what loads and driven nodes see; accelerations only where they are needed."""
         equations, v, model = self.equations, self._velocity(), self.assembly.model
         loss, loss_rate, balance = 0.0, 0.0, np.zeros_like(v)
-        if equations.damping or equations.moving:
+        if equations.damping or equations.is_driven:
             a, carried = self._acceleration(), self.mass.times(v)
             loss, loss_rate = float(np.vdot(v, carried)), 2 * float(np.vdot(a, carried))
-            if equations.moving:
+            if equations.is_driven:
                 balance = equations.out_of_balance(self.integrator.time, self.integrator.x, v, a)
         rates = [float(np.vdot(load.pattern, v)) for load in model.loads]
         loss, loss_rate, *rates = combined(self.assembly.comm, np.array([loss, loss_rate, *rates]))

@@ -140,7 +140,7 @@ group = "tip"
 """
 
 
-class Kind(NamedTuple):
+class Template(NamedTuple):
     """A sort of case: what it shows, which of the project's meshes it takes, its tables."""
 
     about: str
@@ -150,9 +150,9 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "compression": Kind("a quarter block, compressed", "cube", (4, 4, 8), COMPRESSION),
-    "bending": Kind("a cantilever under a force and its own weight", "cantilever", (20, 2, 2), BENDING),
-    "dynamics": Kind("a falling pendulum", "pendulum", (4, 2, 2), DYNAMICS),
+    "compression": Template("a quarter block, compressed", "cube", (4, 4, 8), COMPRESSION),
+    "bending": Template("a cantilever under a force and its own weight", "cantilever", (20, 2, 2), BENDING),
+    "dynamics": Template("a falling pendulum", "pendulum", (4, 2, 2), DYNAMICS),
 }
 EPILOG = "kinds:\n" + "\n".join(f"  {name:<13}{kind.about}" for name, kind in KINDS.items())
 

@@ -11,7 +11,7 @@ from ancf_petsc.errors import CaseError
 
 if TYPE_CHECKING:
     from ancf_petsc.mesh.mesh import Mesh
-    from ancf_petsc.post.case_view import Support
+    from ancf_petsc.post.case_view import Marked
     from ancf_petsc.results.reader import Results
 
 HELP = "look at a run, or at a case before it runs"
@@ -110,13 +110,13 @@ def _show_case(arguments: argparse.Namespace) -> None:
         case_view.explore(*shown)
 
 
-def _supports(case, mesh: Mesh) -> list[Support]:
+def _supports(case, mesh: Mesh) -> list[Marked]:
     """What the case holds, moves and pushes. Raises CaseError for a group that is not in the mesh."""
     from ancf_petsc.mesh.groups import find_group
-    from ancf_petsc.post.case_view import Support
+    from ancf_petsc.post.case_view import Marked
 
-    supports = [Support(one.group, one.fix, dict(one.move)) for one in case.spec.constraint]
-    supports += [Support(one.group, force=one.total) for one in case.spec.load if one.type == "force"]
+    supports = [Marked(one.group, one.fix, dict(one.move)) for one in case.spec.constraint]
+    supports += [Marked(one.group, force=one.total) for one in case.spec.load if one.type == "force"]
     for support in supports:
         find_group(mesh, support.group, "group", case.file)
     return supports

@@ -15,7 +15,7 @@ AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
-class Motion:
+class Drive:
     """A prescribed displacement: amplitude times ramp. Held degrees of freedom have amplitude 0."""
 
     amplitude: float
@@ -25,30 +25,30 @@ class Motion:
         return self.amplitude * self.ramp.value(s)
 
 
-HELD = Motion(0.0, Ramp("constant"))
+HELD = Drive(0.0, Ramp("constant"))
 
 
 @dataclass(frozen=True)
 class Support:
-    """One [[constraint]] of a case on the nodal vectors it drives: axis -> motion."""
+    """One [[constraint]] of a case on the nodal vectors it drives: axis -> drive."""
 
     group: str
     vectors: NDArray[np.int64]
-    motions: dict[int, Motion]
+    drives: dict[int, Drive]
 
 
 @dataclass
 class ConstraintTable:
-    """motion (v, 3): index into motions of each degree of freedom, -1 where it is free."""
+    """drive (v, 3): index into drives of each degree of freedom, -1 where it is free."""
 
-    motion: NDArray[np.int32]
-    motions: list[Motion]
+    drive: NDArray[np.int32]
+    drives: list[Drive]
 
     def hold(self, vectors: NDArray[np.int64], axis: int) -> None:
         """Hold a component of nodal vectors where nothing else drives it."""
         if len(vectors):
-            free = vectors[self.motion[vectors, axis] < 0]
-            self.motion[free, axis] = _index_of(HELD, self.motions)
+            free = vectors[self.drive[vectors, axis] < 0]
+            self.drive[free, axis] = _index_of(HELD, self.drives)
 
 
 def tabulate(supports: Sequence[Support], total: int, node_numbers: NDArray) -> ConstraintTable:
@@ -61,9 +61,9 @@ def tabulate(supports: Sequence[Support], total: int, node_numbers: NDArray) -> 
     source = np.full((total, 3), -1, np.int32)
     for number, support in enumerate(supports):
         groups.append(support.group)
-        for axis, motion in support.motions.items():
-            index = _index_of(motion, table.motions)
-            present = table.motion[support.vectors, axis]
+        for axis, drive in support.drives.items():
+            index = _index_of(drive, table.drives)
+            present = table.drive[support.vectors, axis]
             clash = (present >= 0) & (present != index)
             if clash.any():
                 vector = support.vectors[np.argmax(clash)]
@@ -73,24 +73,24 @@ def tabulate(supports: Sequence[Support], total: int, node_numbers: NDArray) -> 
                     f"{int(clash.sum())} nodes are driven twice in {AXES[axis]}, "
                     f"the first is node {node_numbers[vector]}",
                     key=f"constraint.{support.group}.{AXES[axis]}",
-                    got=_words(motion),
-                    expected=f"{_words(table.motions[present[np.argmax(clash)]])} as {other!r} asks",
+                    got=_words(drive),
+                    expected=f"{_words(table.drives[present[np.argmax(clash)]])} as {other!r} asks",
                     cure="fix or move each degree of freedom once, or take the shared nodes out of one group",
                 )
-            table.motion[support.vectors, axis] = index
+            table.drive[support.vectors, axis] = index
             source[support.vectors, axis] = number
     return table
 
 
-def _index_of(motion: Motion, motions: list[Motion]) -> int:
-    if motion.amplitude == 0.0:
-        motion = HELD
-    if motion not in motions:
-        motions.append(motion)
-    return motions.index(motion)
+def _index_of(drive: Drive, drives: list[Drive]) -> int:
+    if drive.amplitude == 0.0:
+        drive = HELD
+    if drive not in drives:
+        drives.append(drive)
+    return drives.index(drive)
 
 
-def _words(motion: Motion) -> str:
-    if motion.amplitude == 0.0:
+def _words(drive: Drive) -> str:
+    if drive.amplitude == 0.0:
         return "held"
-    return f"moved by {motion.amplitude:g} ({motion.ramp.kind})"
+    return f"moved by {drive.amplitude:g} ({drive.ramp.kind})"

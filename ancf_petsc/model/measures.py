@@ -56,14 +56,14 @@ def mean_stress(assembly: Assembly, cauchy: NDArray, group: str, axis: int) -> f
 
 
 def conjugates(assembly: Assembly, x: PETSc.Vec, out_of_balance: NDArray) -> tuple[NDArray, NDArray]:
-    """What the work hangs on: the reaction of each motion (m,) and the displacement each load sees (l,)."""
+    """What the work hangs on: the reaction of each drive (m,) and the displacement each load sees (l,)."""
     model = assembly.model
     values = out_of_balance.ravel()[assembly.driven]
-    reactions = np.bincount(assembly.driven_motion, values, minlength=len(model.motions))
+    reactions = np.bincount(assembly.driven_by, values, minlength=len(model.drives))
     displacement = x.array_r.reshape(-1, 3) - model.reference[: model.owned]
     seen = np.array([float((load.pattern * displacement).sum()) for load in model.loads])
     both = combined(assembly.comm, np.concatenate((reactions, seen)))
-    return both[: len(model.motions)], both[len(model.motions) :]
+    return both[: len(model.drives)], both[len(model.drives) :]
 
 
 def von_mises(cauchy: NDArray) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from ancf_petsc.kernel.mean import MeanKernels
 from ancf_petsc.kernel.tables import turn_functions
 from ancf_petsc.kernel.tet3413 import Kernels
 from ancf_petsc.material import Law
-from ancf_petsc.model.constraint import Motion
+from ancf_petsc.model.constraint import Drive
 from ancf_petsc.model.load import Load
 from ancf_petsc.parallel.exchange import combined, lookup, scatter_rows
 from ancf_petsc.parallel.numbering import Numbering
@@ -44,7 +44,7 @@ class Model:
     reference (v, 3): nodal vectors of the undeformed body. slots (v,): 0 for a position, j for the j-th slope of its node, which
     follows the position j places behind. Slopes are multiplied by lengths.
     tables: arrays of the cells that every kernel takes; the first is cells (e, a), the third volumes (e,).
-    motion (v, 3): index into motions of driven degrees of freedom, -1 where free.
+    drive (v, 3): index into drives of driven degrees of freedom, -1 where free.
     size: diagonal of the box around the body.
     cell_numbers: (e,) number of each cell in the mesh file.
     groups: name -> owned nodal vectors of its nodes (positions).
@@ -61,8 +61,8 @@ class Model:
     slots: NDArray[np.int8]
     tables: tuple
     regions: list[Region]
-    motion: NDArray[np.int32]
-    motions: list[Motion]
+    drive: NDArray[np.int32]
+    drives: list[Drive]
     size: float
     cell_numbers: NDArray[np.int64]
     loads: list[Load] = field(default_factory=list)
@@ -104,7 +104,7 @@ class Model:
 
     def driven_bits(self) -> NDArray[np.uint8]:
         """(v,) bit i is set where component i of the nodal vector is driven, bit 3 where another rank owns it."""
-        bits = ((self.motion >= 0) << np.arange(3)).sum(axis=1).astype(np.uint8)
+        bits = ((self.drive >= 0) << np.arange(3)).sum(axis=1).astype(np.uint8)
         bits[self.owned :] |= 8
         return bits
 

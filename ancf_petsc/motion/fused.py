@@ -31,7 +31,7 @@ class Leap(NamedTuple):
 def fused_motion(equations: Equations) -> FusedMotion | None:
     """For one rank, one material, an element with such kernels, nothing driven along, a mass that is factored; else None."""
     model = equations.assembly.model
-    simple = equations.comm.size == 1 and len(model.regions) == 1 and not equations.moving
+    simple = equations.comm.size == 1 and len(model.regions) == 1 and not equations.is_driven
     fits = simple and way_of(model.element).motion is not None and equations.solver.is_factored
     return FusedMotion(equations) if fits else None
 

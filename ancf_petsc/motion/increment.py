@@ -105,7 +105,7 @@ class IncrementSolver:
         self._always_new = False
         self._residual = self.assembly.vector()
         self._quick = self._create("basic")
-        self.linear = LinearSolver(self.assembly, self.matrix, self._quick.getKSP(), moving=True)
+        self.linear = LinearSolver(self.assembly, self.matrix, self._quick.getKSP(), with_mass=True)
         with default_options({"snes_linesearch_type": "basic"}):
             self._quick.setFromOptions()
         self._careful = self._create("bt")

@@ -27,7 +27,7 @@ from ancf_petsc.mesh.groups import (
 )
 from ancf_petsc.mesh.mesh import Group, Mesh
 from ancf_petsc.mesh.read import read_mesh
-from ancf_petsc.model.constraint import ConstraintTable, Motion, Support, tabulate
+from ancf_petsc.model.constraint import ConstraintTable, Drive, Support, tabulate
 from ancf_petsc.model.measures import AXES, CurveChoice
 from ancf_petsc.model.ramp import make_ramp
 from ancf_petsc.plan.free_motion import free_motions
@@ -38,7 +38,7 @@ STROKE = "stroke"
 
 
 @dataclass
-class Blueprint:
+class Plan:
     """Tables over all nodal vectors (v) and all cells (e), in file order.
 
     space: nodes, nodal vectors and cells. shares: force load number -> (v,) share of each nodal vector in the total.
@@ -57,19 +57,19 @@ class Blueprint:
     means: dict[str, NDArray] = field(default_factory=dict)
 
 
-def draw(case: Case) -> Blueprint:
+def make_plan(case: Case) -> Plan:
     """Read the mesh and enter everything the case says into tables. Raises CaseError."""
     spec = case.spec
     try:
         row = element(spec.mesh.element)
         mesh = read_mesh(case.mesh_file, row.kinds, duplicates=spec.mesh.duplicates, element=row.code)
-        return draw_on(case, mesh)
+        return plan_on(case, mesh)
     except CaseError as error:
         error.file = error.file or case.file
         raise
 
 
-def draw_on(case: Case, mesh: Mesh) -> Blueprint:
+def plan_on(case: Case, mesh: Mesh) -> Plan:
     """The tables of a case on a mesh that was read for it. Raises CaseError."""
     spec, row = case.spec, element(case.spec.mesh.element)
     try:
@@ -80,25 +80,25 @@ def draw_on(case: Case, mesh: Mesh) -> Blueprint:
     complete(mesh, row)
     chosen = {name: group.model_dump(exclude_none=True) for name, group in spec.groups.items()}
     mesh.groups |= choose_groups(mesh, chosen, file=case.file)
-    drawer = _Drawer(case, mesh, row)
-    constraints = drawer.constraints()
+    planner = _Planner(case, mesh, row)
+    constraints = planner.constraints()
     if spec.statics is not None:
-        drawer.refuse_free_motions(constraints)
-    return Blueprint(
+        planner.refuse_free_motions(constraints)
+    return Plan(
         mesh=mesh,
         element=row,
-        space=drawer.space,
+        space=planner.space,
         constraints=constraints,
-        material=drawer.materials(),
-        curve=drawer.curve(),
-        shares=drawer.shares(),
-        members=drawer.members(),
-        means=drawer.means(),
+        material=planner.materials(),
+        curve=planner.curve(),
+        shares=planner.shares(),
+        members=planner.members(),
+        means=planner.means(),
     )
 
 
-class _Drawer:
-    """Fills the tables of a blueprint, one method a table."""
+class _Planner:
+    """Fills the tables of a plan, one method a table."""
 
     def __init__(self, case: Case, mesh: Mesh, row: Element) -> None:
         self.file = case.file
@@ -139,11 +139,11 @@ class _Drawer:
         for spec in self.spec.constraint:
             group = self.group(spec.group, f"constraint.{spec.group}.group")
             ramp = make_ramp(spec.ramp, "linear")
-            motions = {AXES.index(axis): Motion(0.0, ramp) for axis in spec.fix}
-            motions |= {AXES.index(axis): Motion(amount, ramp) for axis, amount in spec.move.items()}
-            supports.append(Support(spec.group, self.positions(group), motions))
+            drives = {AXES.index(axis): Drive(0.0, ramp) for axis in spec.fix}
+            drives |= {AXES.index(axis): Drive(amount, ramp) for axis, amount in spec.move.items()}
+            supports.append(Support(spec.group, self.positions(group), drives))
             if self.element.has_slopes:
-                tangents.append((set(motions), parts_for_support(self.mesh, group)))
+                tangents.append((set(drives), parts_for_support(self.mesh, group)))
             held += [(slopes_at(self.space, group.nodes), AXES.index(axis)) for axis in spec.slopes]
         numbers = self.mesh.node_numbers[self.space.nodes][self.space.node_of()]
         try:
@@ -173,7 +173,7 @@ class _Drawer:
         """Raise CaseError if a connected piece of the body can move without deforming."""
         space = self.space
         pieces, label = connected_pieces(space.cells, len(space.nodes))
-        points, driven, nodes = space.points, constraints.motion >= 0, space.node_of()
+        points, driven, nodes = space.points, constraints.drive >= 0, space.node_of()
         free = free_motions(
             space.reference(), driven, label[nodes], pieces, slopes=space.slots() > 0, normal=self.normal
         )

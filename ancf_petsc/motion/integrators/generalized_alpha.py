@@ -58,7 +58,7 @@ class GeneralizedAlpha(OneStep):
         h, v = self.h, self.v.array_r.reshape(-1, 3)
         a1 = (d - h * v) / (self.beta * h * h) - (0.5 / self.beta - 1) * self.a
         v1 = v + h * ((1 - self.gamma) * self.a + self.gamma * a1)
-        if self.equations.moving:
+        if self.equations.is_driven:
             driven = self.equations.assembly.driven
             a1.ravel()[driven] = self.equations.driven_accelerations(self.goal)
             v1.ravel()[driven] = self.equations.driven_velocities(self.goal)
@@ -72,7 +72,7 @@ class GeneralizedAlpha(OneStep):
     def forces(self, d: PETSc.Vec) -> Forces:
         part, time = self.alpha_f, self.time + self.alpha_f * self.h
         carried = self._inertia * d.array_r.reshape(-1, 3)
-        if self.equations.moving:
+        if self.equations.is_driven:
             carried.ravel()[self.equations.assembly.driven] = 0.0
         carried += self._still
         values, squared = self.unbalance(time, d, part, carried)

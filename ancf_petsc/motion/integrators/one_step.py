@@ -112,7 +112,7 @@ class OneStep(Integrator):
     def _step(self, ts: PETSc.TS) -> None:
         guess = self.guess()
         driven = self.equations.assembly.driven
-        if self.equations.moving:
+        if self.equations.is_driven:
             before = self.x.array_r[driven]
             guess.ravel()[driven] = self.equations.driven_positions(self.goal) - before
         self._why = self.solver.solve(guess)
@@ -121,7 +121,7 @@ class OneStep(Integrator):
             return
         self._known = self.finish(self.solver.d.array_r.reshape(-1, 3))
         self.x.axpy(1.0, self.solver.d)
-        if self.equations.moving:
+        if self.equations.is_driven:
             self.x.array[driven] = self.equations.driven_positions(self.goal)
         ts.setTime(self.goal)
 

@@ -71,7 +71,7 @@ class RungeKutta5dp(FirstOrder):
         a = self.equations.acceleration(t, x, v)
         rates = f.array
         rates[: self._own], rates[self._own :] = v.ravel(), a.ravel()
-        if self.equations.moving:
+        if self.equations.is_driven:
             driven = self.equations.assembly.driven
             rates[driven] = rates[self._own + driven] = 0.0
 
