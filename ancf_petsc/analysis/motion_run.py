@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from ancf_petsc.analysis.host.clock import Clock
 from ancf_petsc.analysis.record import Record
+from ancf_petsc.axes import AXES
 from ancf_petsc.errors import Interrupted, MotionStopped
 from ancf_petsc.log import STEPS
-from ancf_petsc.model.measures import AXES, conjugates
+from ancf_petsc.model.measures import conjugates
 from ancf_petsc.model.motion_work import MotionWork, Powers
 from ancf_petsc.motion.integration import TimeIntegration
 from ancf_petsc.motion.integrators import Integrator, Step

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ancf_petsc.analysis.build import FileOrder
+from ancf_petsc.analysis.file_order import FileOrder
 from ancf_petsc.kernel.tables import turn_functions
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import ToSlabs

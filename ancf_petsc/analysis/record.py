@@ -12,11 +12,13 @@ from petsc4py import PETSc
 
 from ancf_petsc.analysis.build import Built
 from ancf_petsc.analysis.output_points import OutputPoints
+from ancf_petsc.axes import AXES
 from ancf_petsc.input.schema import CaseSpec
 from ancf_petsc.model.assembly import Assembly
-from ancf_petsc.model.measures import AXES, mean_position, mean_stress, reaction, von_mises
+from ancf_petsc.model.measures import mean_position, mean_stress, reaction, von_mises
 from ancf_petsc.parallel.exchange import ToSlabs, combined
-from ancf_petsc.plan.plan import STROKE
+from ancf_petsc.plan.curve import STROKE
+from ancf_petsc.plan.probes import name_of
 from ancf_petsc.results.store import ResultStore
 from ancf_petsc.results.tables import CsvTable
 
@@ -122,7 +124,7 @@ class Record:
     def _probes(self, x: PETSc.Vec) -> dict[str, float]:
         columns: dict[str, float] = {}
         for probe in self.spec.probe:
-            position, displacement = mean_position(self.assembly, x, f"probe {probe.name}")
+            position, displacement = mean_position(self.assembly, x, name_of(probe))
             columns |= {f"{probe.name}.{axis}": position[i] for i, axis in enumerate(AXES)}
             columns |= {f"{probe.name}.u{axis}": displacement[i] for i, axis in enumerate(AXES)}
         return columns

@@ -10,7 +10,7 @@ from ancf_petsc.analysis.record import Record
 from ancf_petsc.analysis.static_run import StaticRun
 from ancf_petsc.input.load import Case
 from ancf_petsc.model.assembly import Assembly
-from ancf_petsc.plan.plan import output_times
+from ancf_petsc.plan.outputs import output_times
 from ancf_petsc.solve.newton import Newton
 
 

@@ -83,7 +83,7 @@ def _print_case(case: Case, plan: Plan) -> None:
 
     spec = case.spec
     dof = plan.element.components * plan.space.vectors
-    driven = dof - int((plan.constraints.drive < 0).sum())
+    driven = dof - int((plan.supports.drive < 0).sum())
     facts: list[tuple[str, object]] = [
         ("case", spec.title),
         ("analysis", _analysis(case)),
@@ -109,13 +109,12 @@ def _print_case(case: Case, plan: Plan) -> None:
         nodes = int(plan.members[constraint.group].sum())
         facts.append(("constraint", f"{constraint.group}, {nodes} nodes: {'; '.join(words)}"))
     for load in spec.load:
-        what = load.acceleration if load.type == "gravity" else (load.group, load.total)
-        facts.append(("load", f"{load.type} {what}"))
+        facts.append(("load", f"{load.type} {load.describe()}"))
     show_facts(facts)
 
 
 def _analysis(case: Case) -> str:
-    from ancf_petsc.plan.plan import output_times
+    from ancf_petsc.plan.outputs import output_times
 
     if case.spec.statics:
         return f"statics, {len(output_times(case.spec, case.file))} outputs after the start"

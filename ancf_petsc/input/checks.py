@@ -67,7 +67,7 @@ def _materials(spec: CaseSpec) -> Problems:
 
 
 def _densities(spec: CaseSpec) -> Problems:
-    gravity = any(load.type == "gravity" for load in spec.load)
+    gravity = any(load.needs_mass for load in spec.load)
     if not gravity and not spec.dynamics:
         return
     for index, material in enumerate(spec.material):

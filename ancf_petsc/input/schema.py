@@ -10,14 +10,15 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from ancf_petsc.axes import AXES
 from ancf_petsc.input.analysis import (
     CriticalMode,
     DynamicsSpec,
     InitialSpec,
     StaticsSpec,
 )
+from ancf_petsc.input.loads import ForceSpec, GravitySpec, LoadSpec
 from ancf_petsc.input.types import (
-    AXES,
     Axes,
     Axis,
     Direction,
@@ -118,26 +119,6 @@ class ConstraintSpec(Table):
                 cure="drop one",
             )
         return self
-
-
-class GravitySpec(Table):
-    """One [[load]] of type gravity, on everything that has mass."""
-
-    type: Literal["gravity"]
-    acceleration: Vector = key("three numbers; such as [0.0, 0.0, -9.81]")
-    ramp: RampKey = key('a ramp; such as "cosine"', "linear")
-
-
-class ForceSpec(Table):
-    """One [[load]] of type force: dead, spread over the group by the shape functions."""
-
-    type: Literal["force"]
-    group: Name = key("a group's name in quotes; of the mesh file or of [groups]")
-    total: Vector = key("three numbers; the whole force on the group, such as [0.0, 0.0, -120.0]")
-    ramp: RampKey = key('a ramp; such as "cosine"', "linear")
-
-
-LoadSpec = Annotated[GravitySpec | ForceSpec, Field(discriminator="type")]
 
 
 class CurveSpec(Table):

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator
 from pydantic_core import PydanticCustomError
 
+from ancf_petsc.axes import AXES
 from ancf_petsc.errors import did_you_mean
 
-AXES = ("x", "y", "z")
 RAMPS = ("linear", "cosine", "constant")
 
 Axis = Literal["x", "y", "z"]

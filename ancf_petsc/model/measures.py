@@ -2,27 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import combined
-
-AXES = ("x", "y", "z")
-
-
-@dataclass(frozen=True)
-class CurveChoice:
-    """Which group and component the columns `force` and `stroke` follow; area: undeformed, None for no surface."""
-
-    force_group: str
-    force_axis: int
-    stroke_group: str
-    stroke_axis: int
-    area: float | None
 
 
 def reaction(assembly: Assembly, out_of_balance: NDArray, group: str) -> NDArray[np.float64]:

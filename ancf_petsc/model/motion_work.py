@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ancf_petsc.model.constraint import Drive
+from ancf_petsc.model.drive import Drive
 from ancf_petsc.model.load import Load
 from ancf_petsc.model.work import PathWork
 

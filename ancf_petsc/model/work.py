@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ancf_petsc.model.constraint import Drive
+from ancf_petsc.model.drive import Drive
 from ancf_petsc.model.load import Load
 from ancf_petsc.model.ramp import Ramp
 

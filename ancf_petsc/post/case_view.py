@@ -11,6 +11,7 @@ import numpy as np
 import pyvista
 from numpy.typing import NDArray
 
+from ancf_petsc.axes import AXES
 from ancf_petsc.mesh.groups import surface_of
 from ancf_petsc.mesh.mesh import Group, Mesh
 from ancf_petsc.post.panels import COLOURS
@@ -18,7 +19,6 @@ from ancf_petsc.post.scene import DARK, MANY_CELLS, frame, make_plotter, matt, s
 from ancf_petsc.results.xdmf import CELL_KINDS
 
 Points = NDArray[np.float64]
-AXES = "xyz"
 GROUP_COLOURS = (COLOURS[2], COLOURS[4], COLOURS[5], COLOURS[3])  # what arrows have is left out
 HELD, MOVED, LOADED = "#444444", "#D55E00", "#0072B2"
 
