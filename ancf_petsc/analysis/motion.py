@@ -53,7 +53,7 @@ class MotionAnalysis:
         """
         spec, interval = self.spec, self.spec.duration / self.spec.outputs
         if spec.step is None:
-            return Settings(0.0, spec.tolerance or 0.0, spec.spectral_radius, spec.theta, spec.order)
+            return Settings(0.0, spec.tolerance or 0.0, spec.option)
         size = interval / steps_in(interval, spec.step)
         if abs(size - spec.step) > 1e-9 * spec.step:
             log.info(
@@ -63,7 +63,7 @@ class MotionAnalysis:
                 round(interval / size),
                 interval,
             )
-        return Settings(size, 0.0, spec.spectral_radius, spec.theta, spec.order)
+        return Settings(size, 0.0, spec.option)
 
     def prepare(self) -> None:
         """Set the solvers up, so that every option has been asked for."""

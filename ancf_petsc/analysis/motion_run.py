@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ancf_petsc.analysis.host.clock import Clock
-from ancf_petsc.analysis.record import Record
+from ancf_petsc.analysis.record import COUNTS, Record
 from ancf_petsc.axes import AXES
 from ancf_petsc.errors import Interrupted, MotionStopped
 from ancf_petsc.log import STEPS
@@ -20,7 +20,7 @@ from ancf_petsc.motion.integration import TimeIntegration
 from ancf_petsc.motion.integrators import Integrator, Step
 from ancf_petsc.parallel.exchange import combined
 
-COUNTS = ("newton_iterations", "linear_iterations", "steps", "rejected_steps")
+MOTION_COUNTS = (*COUNTS, "rejected_steps")
 log = logging.getLogger(STEPS)
 
 
@@ -43,8 +43,8 @@ class MotionRun:
         self.mass, self.assembly = self.equations.mass, self.equations.assembly
         self.duration = self.equations.duration
         self.times = set(times)
-        self.totals = dict.fromkeys(COUNTS, 0)
-        self._since = dict.fromkeys(COUNTS, 0)
+        self.totals = dict.fromkeys(MOTION_COUNTS, 0)
+        self._since = dict.fromkeys(MOTION_COUNTS, 0)
         model = self.assembly.model
         self.work = MotionWork(model.drives, model.loads, self.duration)
         self._ramped = any(load.ramp.kind != "constant" for load in model.loads)
@@ -70,7 +70,9 @@ class MotionRun:
     # --- steps
 
     def _on_step(self, step: Step) -> None:
-        for name, count in zip(COUNTS, (step.newton, step.linear, step.count, step.rejected), strict=True):
+        for name, count in zip(
+            MOTION_COUNTS, (step.newton, step.linear, step.count, step.rejected), strict=True
+        ):
             self.totals[name] += count
             self._since[name] += count
         if step.time in self.path.corners:
@@ -126,7 +128,7 @@ class MotionRun:
             more = {**self._energies(), **self._momenta(), **self._since}
             row = self.record.write({"time": now}, x, balance, more, {"velocity": v})
             self._tell(row)
-        self._since = dict.fromkeys(COUNTS, 0)
+        self._since = dict.fromkeys(MOTION_COUNTS, 0)
         self._written = now
 
     def _energies(self) -> dict[str, float]:

@@ -22,6 +22,9 @@ from ancf_petsc.plan.probes import name_of
 from ancf_petsc.results.store import ResultStore
 from ancf_petsc.results.tables import CsvTable
 
+COUNTS = ("newton_iterations", "linear_iterations", "steps")
+"""Columns of what a run did since its last output."""
+
 
 class Record:
     """Writes outputs into a folder. Every method is collective."""

@@ -94,7 +94,7 @@ def _compile(case: Case, comm: MPI.Comm) -> None:
     row = element(case.spec.mesh.element)
     dynamics = case.spec.dynamics
     moving = dynamics is not None
-    mean = dynamics is not None and dynamics.integrator == "energy_momentum"
+    mean = dynamics is not None and dynamics.method.conserves
     if comm.rank == 0 and not is_compiled(row, laws, mean=mean, moving=moving):
         log.info("compiling kernels (%s): once, under a minute", ", ".join(law.name for law in laws))
     on_root(comm, lambda: compile_kernels(row, laws, mean=mean, moving=moving))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.analysis.host.clock import Clock
-from ancf_petsc.analysis.record import Record
+from ancf_petsc.analysis.record import COUNTS, Record
 from ancf_petsc.errors import Interrupted, NoEquilibrium
 from ancf_petsc.log import STEPS
 from ancf_petsc.model.measures import conjugates
@@ -19,7 +19,6 @@ from ancf_petsc.solve.load_path import LoadPath, PathStep
 from ancf_petsc.solve.newton import Newton
 
 log = logging.getLogger(STEPS)
-COUNTS = ("newton_iterations", "linear_iterations", "steps")
 
 
 class StaticRun:

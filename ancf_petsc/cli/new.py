@@ -9,7 +9,6 @@ from shlex import quote
 from typing import NamedTuple
 
 HELP = "write a commented case and its mesh to start from"
-CASE_FILE = "case.toml"
 DEFAULT_KIND = "compression"
 
 HEAD = """\
@@ -166,14 +165,15 @@ def execute(arguments: argparse.Namespace) -> int:
     from ancf_petsc.cli import rank
 
     if rank() == 0:
-        write_case(arguments.name, arguments.kind)
-        print(f"wrote {arguments.name / CASE_FILE} and its mesh; next: ancf run {arguments.name}")
+        file = write_case(arguments.name, arguments.kind)
+        print(f"wrote {file} and its mesh; next: ancf run {arguments.name}")
     return 0
 
 
 def write_case(folder: Path, kind: str = DEFAULT_KIND) -> Path:
     """Make `folder` with case.toml and a mesh; the case file. Raises CaseError where there is something."""
     from ancf_petsc.errors import CaseError, did_you_mean
+    from ancf_petsc.input.load import CASE_FILE
     from ancf_petsc.mesh.generate import make_mesh
 
     if kind not in KINDS:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from json import dumps
 from pathlib import Path
@@ -17,8 +16,8 @@ from ancf_petsc.axes import AXES
 from ancf_petsc.errors import CaseError, did_you_mean
 from ancf_petsc.input.loads import LOADS
 from ancf_petsc.input.schema import CaseSpec
+from ancf_petsc.input.toml import BARE
 
-BARE = re.compile(r"[A-Za-z0-9_-]+")
 LONGEST = 80
 ABSENT = object()
 FORMAT_PAGE = "docs/case-format.md has examples"

@@ -160,7 +160,7 @@ def grade(gmsh: Any, curves: Sequence[int], size: float, rim: float) -> None:
         gmsh.option.setNumber(f"Mesh.MeshSize{source}", 0)
 
 
-def _rim_curves(gmsh: Any, body: Body) -> list[int]:
+def _rim_curves(gmsh: Any, body: Primitive) -> list[int]:
     """Curves of the model on planes of rims and on none of symmetry."""
     symmetry = [planes for name, planes in body.faces.items() if name.startswith("symmetry")]
     found = []

@@ -18,10 +18,10 @@ from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.linear.solver import LinearSolver
+from ancf_petsc.solve.newton import MOST_ITERATIONS
 from ancf_petsc.solve.petsc import default_options
 
 Reason = PETSc.SNES.ConvergedReason
-MOST_ITERATIONS = 25
 SLOW = 0.1  # a residual that falls by less asks for a new matrix: factoring costs some five iterations
 ROUNDING = 4e-16  # of a position: what it leaves of forces is this times stiffness and position
 WORDS = {

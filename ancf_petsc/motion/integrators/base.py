@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.errors import MotionStopped
+from ancf_petsc.input.methods import METHODS
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.fused import FusedMotion, fused_motion
 
@@ -25,13 +26,11 @@ def steps_in(interval: float, step: float) -> int:
 
 @dataclass(frozen=True)
 class Settings:
-    """What a case may set. step: 0 where the method chooses its steps by `tolerance`."""
+    """What a case may set. step: 0 where the method chooses its steps by `tolerance`. option: of the method's own key."""
 
     step: float = 0.0
     tolerance: float = 0.0
-    spectral_radius: float = 0.8
-    theta: float = 0.5
-    order: int = 2
+    option: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -119,7 +118,8 @@ class Integrator(ABC):
     def failed(self, goal: float, why: str) -> MotionStopped:
         """The error of a step that failed."""
         cure = "a smaller tolerance" if self.adaptive else "a smaller dynamics.step"
-        hint = "" if self.name == "energy_momentum" else ', or integrator = "energy_momentum"'
+        others = " or ".join(f'"{row.name}"' for row in METHODS.values() if row.conserves)
+        hint = "" if METHODS[self.name].conserves else f", or integrator = {others}"
         return MotionStopped(
             f"{self.name} cannot go on from time {self.time:.6g} to {goal:.6g}: {why}; try {cure}{hint}"
         )

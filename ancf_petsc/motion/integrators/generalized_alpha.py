@@ -28,7 +28,7 @@ class GeneralizedAlpha(OneStep):
     name = "generalized_alpha"
 
     def __init__(self, equations: Equations, settings: Settings, x: PETSc.Vec, v: PETSc.Vec) -> None:
-        radius = settings.spectral_radius
+        radius = settings.option
         self.alpha_m, self.alpha_f = (2 - radius) / (1 + radius), 1 / (1 + radius)
         self.gamma = 0.5 + self.alpha_m - self.alpha_f
         self.beta = 0.25 * (1 + self.alpha_m - self.alpha_f) ** 2
@@ -123,5 +123,5 @@ class GeneralizedAlpha(OneStep):
     def describe(self) -> str:
         if self._newton is not None:
             how = f"{Integrator.describe(self)}, compiled Newton + cholesky, {self.solver.linear.dof} degrees of freedom"
-            return f"{how}, spectral radius {self.settings.spectral_radius:g}"
-        return f"{super().describe()}, spectral radius {self.settings.spectral_radius:g}"
+            return f"{how}, spectral radius {self.settings.option:g}"
+        return f"{super().describe()}, spectral radius {self.settings.option:g}"
