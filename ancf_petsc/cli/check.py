@@ -35,7 +35,7 @@ def execute(arguments: argparse.Namespace) -> int:
         plan = make_plan(case)
         _print_mesh(plan)
         _print_case(case, plan)
-        print("the case is good")
+        print("case is valid")
 
     on_root(comm, show)
     return 0

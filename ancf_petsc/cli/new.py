@@ -188,10 +188,9 @@ def write_case(folder: Path, kind: str = DEFAULT_KIND) -> Path:
         folder.mkdir(parents=True)
     except OSError as error:
         raise CaseError(
-            f"cannot be made: {error.strerror}",
+            f"cannot create the folder: {error.strerror}",
             file=folder,
-            expected="a folder one may write to",
-            cure="go elsewhere",
+            cure="choose a folder you can write to",
         ) from None
     chosen = KINDS[kind]
     mesh = f"{chosen.mesh}.msh"

@@ -88,7 +88,7 @@ def _figures(arguments: argparse.Namespace, runs: list[Results]) -> dict[str, Fi
     from ancf_petsc.post.reference import ReferenceCurve, read_level, read_reference
 
     if arguments.level and not arguments.probe:
-        raise CaseError("of what?", key="--level", cure="name a component with --probe, as in --probe tip.z")
+        raise CaseError("needs a probe component", key="--level", cure="such as --probe tip.z")
     levels = [read_level(text) for text in arguments.level]
     drawn: list[Results | ReferenceCurve] = [
         *runs,

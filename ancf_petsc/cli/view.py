@@ -71,7 +71,7 @@ def _show_run(arguments: argparse.Namespace) -> None:
 
     results = open_results(arguments.case)
     if arguments.changes:
-        raise CaseError("a run has been solved: nothing of it changes", file=arguments.case, key="--set")
+        raise CaseError("applies to cases; this is a finished run", file=arguments.case, key="--set")
     look = view.Look(arguments.field, arguments.component, arguments.scale, arguments.undeformed)
     step = _step(results, arguments)
     if arguments.screenshot:
@@ -96,7 +96,7 @@ def _show_case(arguments: argparse.Namespace) -> None:
     from ancf_petsc.post import case_view
 
     if arguments.movie:
-        raise CaseError("nothing moves before a case is solved", file=arguments.case, key="--movie")
+        raise CaseError("needs a finished run; this is a case", file=arguments.case, key="--movie")
     case = load_case(arguments.case, changes(arguments))
     row = element(case.spec.mesh.element)
     mesh = read_mesh(case.mesh_file, row.kinds, duplicates=case.spec.mesh.duplicates, element=row.code)

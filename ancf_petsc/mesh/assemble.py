@@ -170,7 +170,7 @@ def _settle_duplicates(mesh: Mesh, numbering: NodeNumbers, duplicates: str) -> N
     pairs = pairs[np.lexsort(pairs.T[::-1])]
     doubled = len(np.unique(pairs[:, 1]))
     if duplicates == "keep":
-        mesh.notes.append(f"{doubled} nodes lie on others: kept apart")
+        mesh.notes.append(f'{doubled} coincident nodes kept separate (mesh.duplicates = "keep")')
     elif duplicates == "merge":
         _merge(mesh, numbering, pairs)
         mesh.notes.append(f"{doubled} nodes lay on others: merged")
@@ -178,7 +178,7 @@ def _settle_duplicates(mesh: Mesh, numbering: NodeNumbers, duplicates: str) -> N
         first, second = pairs[0]
         one, other = mesh.node_numbers[first], mesh.node_numbers[second]
         raise mesh_error(numbering.path)(
-            f"{doubled} nodes lie on others, first nodes {one} and {other} at {_place(mesh.points[first])}",
+            f"{doubled} nodes coincide with others, first nodes {one} and {other} at {_place(mesh.points[first])}",
             cure='set mesh.duplicates = "merge" to join them or "keep" for a crack or separate bodies',
         )
 
