@@ -57,7 +57,7 @@ class MotionAnalysis:
         size = interval / steps_in(interval, spec.step)
         if abs(size - spec.step) > 1e-9 * spec.step:
             log.info(
-                "step %.6g reduced to %.6g: %d equal steps fill the interval of outputs, %.6g",
+                "step %.6g shortened to %.6g: %d equal steps fill the interval of outputs, %.6g",
                 spec.step,
                 size,
                 round(interval / size),

@@ -112,9 +112,10 @@ class ConstraintSpec(Table):
 
     @model_validator(mode="after")
     def _check(self) -> ConstraintSpec:
-        if not self.fix and not self.move and not self.slopes:
+        kinds = [name for name in type(self).model_fields if name not in ("group", "ramp")]
+        if not any(getattr(self, name) for name in kinds):
             raise problem(
-                "neither fix nor move nor slopes",
+                f"neither {' nor '.join(kinds)}",
                 expected="one of them at least",
                 cure='such as fix = ["x", "y", "z"]',
             )
