@@ -139,12 +139,12 @@ def test_a_material_is_a_block(project, monkeypatch):
 
 def model_of(folder, element, **tables):
     """The model of a bar held at one end."""
-    mesh = make_mesh("bar", folder / "bar.msh", divisions=(1, 2, 2), hexahedra=element != "3413")
+    mesh = make_mesh("bar", folder / "bar.msh", divisions=(2, 2, 1), hexahedra=element != "3413")
     data = {
         "title": "bar",
         "mesh": {"file": mesh.name, "element": element},
         "material": {"law": "svk", "young": 1e7, "poisson": 0.3},
-        "constraint": [{"group": "clamp", "fix": ["x", "y", "z"]}],
+        "constraint": [{"group": "bottom", "fix": ["x", "y", "z"]}],
         "statics": {},
         **tables,
     }
@@ -159,7 +159,7 @@ def change_cases(monkeypatch, **keys):
 
 
 def test_a_load_is_a_table_of_keys_and_a_file(project, monkeypatch, tmp_path):
-    """A traction is the force of traction times area, 0.5 x 0.1 x 0.1 m being the bar's size."""
+    """A traction is the force of traction times area, 0.1 x 0.1 m being its end."""
     names = dict(vars(loads))
     exec(code_of(project, "Add a load"), names)
     types = loads.Types | names["TractionSpec"]
@@ -169,7 +169,7 @@ def test_a_load_is_a_table_of_keys_and_a_file(project, monkeypatch, tmp_path):
     monkeypatch.setitem(plan_loads.KINDS, "traction", module)
     for element in ("3413", "3843"):
         found, expected = (
-            model_of(tmp_path, element, load=[{"group": "end", **load}]).loads[0].pattern
+            model_of(tmp_path, element, load=[{"group": "top", **load}]).loads[0].pattern
             for load in (
                 {"type": "traction", "value": [0.0, 2.0, -3.0]},
                 {"type": "force", "total": [0.0, 0.02, -0.03]},
@@ -177,7 +177,7 @@ def test_a_load_is_a_table_of_keys_and_a_file(project, monkeypatch, tmp_path):
         )
         np.testing.assert_allclose(found, expected, atol=1e-15)
         assert found.any()
-    tables = {"groups": {"tip": {"nearest": [0.5, 0.0, 0.0]}}}
+    tables = {"groups": {"tip": {"nearest": [0.0, 0.0, 0.5]}}}
     tables["load"] = [{"type": "traction", "group": "tip", "value": [1.0, 0.0, 0.0]}]
     with pytest.raises(CaseError, match=r"load\.0\.group: no surface: found 'tip', expected boundary faces"):
         model_of(tmp_path, "3413", **tables)
@@ -195,10 +195,10 @@ def test_a_support_is_a_key_and_a_file(project, monkeypatch, tmp_path):
     monkeypatch.setattr(supports, "KINDS", [*supports.KINDS, module.enter])
     axes = ["x", "y", "z"]
     for element in ("3413", "3843"):
-        by_keys = {"group": "clamp", "fix": axes, **({"slopes": axes} if element == "3843" else {})}
+        by_keys = {"group": "bottom", "fix": axes, **({"slopes": axes} if element == "3843" else {})}
         found, expected = (
             model_of(tmp_path, element, constraint=[row]).drive
-            for row in ({"group": "clamp", "clamp": True}, by_keys)
+            for row in ({"group": "bottom", "clamp": True}, by_keys)
         )
         np.testing.assert_array_equal(found, expected)
         assert (found >= 0).any()
