@@ -60,7 +60,7 @@ class _Pending(logging.Handler):
         self.records.append(record)
 
 
-class Progress(Protocol):
+class ProgressBar(Protocol):
     """What `progress` gives: `advance_to` a share of the total, with a few words beside the bar."""
 
     def advance_to(self, done: float, words: str = "") -> None: ...
@@ -145,7 +145,7 @@ def close() -> None:
 
 
 @contextmanager
-def progress(total: float, unit: str = "") -> Iterator[Progress]:
+def progress(total: float, unit: str = "") -> Iterator[ProgressBar]:
     """A bar with share, elapsed time and time left, on a terminal; elsewhere nothing."""
     terminal = next((handler for handler in LOGGER.handlers if isinstance(handler, _Terminal)), None)
     if terminal is None or terminal.level > logging.INFO or not on_terminal():

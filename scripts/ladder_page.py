@@ -225,7 +225,7 @@ def cantilever_words(report: Report) -> list[str]:
         f"The beam of `cases/cantilever`; the limit is {limits['answer']:.5f} m and {limits['energy']:.4f} J of strain energy.",
         "",
         "- **Take 3843 where parallelepipeds fit, else 3443+4 or 3-10-1-3.** The extrapolated ladders are in the second table.",
-        f"- **Locking.** 3413 is still off by {_told(locked, report)}, and its ladder tells no limit;"
+        f"- **Locking.** 3413 is still off by {_told(locked, report)}; its results are too far from convergence to extrapolate;"
         f" 3813 is off by {_told(brick, report)}.",
         f"- **Grading** towards the clamp: 3843 is off by {_told(few, report)}, and by {_told(graded, report)}."
         f" Quadratic tetrahedra dislike the long cells of these meshes: 3-10-1-3 is off by {_told(quadratic, report)}.",
@@ -250,7 +250,7 @@ def block_words(report: Report) -> list[str]:
         "",
         f"- **Take {_preferred(report)}.**",
         f"- **The limit is known to {100 * limits['uncertain'] / abs(limits['answer']):.1g} % only**: errors below are from"
-        f" {limits['answer']:.6g} N, and who is within 1 % hangs on the choice, as the first table shows.",
+        f" {limits['answer']:.6g} N, and which elements are within 1 % depends on the limit chosen, as the first table shows.",
         f"- On the finest graded meshes {told}.",
         f"- With edges of one length 3-10-1-3 is off by {_told(even, report)}.",
         "",

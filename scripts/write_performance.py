@@ -197,7 +197,7 @@ def charts(results: Report) -> list[str]:
             "",
         ]
         failed = [f"- `{name}`: {found['problem']}" for name, found in results.items() if cannot(name, found)]
-        lines += ["These end before:", "", *failed, ""] if failed else []
+        lines += ["These runs stopped before the full stroke:", "", *failed, ""] if failed else []
     if sweep(results, "stroke"):
         draw_strokes(results, STORE / "stroke.png")
         lines += [

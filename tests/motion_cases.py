@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 from ancf_petsc import case_from_dict, load_case
 from ancf_petsc.analysis.build import build
-from ancf_petsc.analysis.motion import Motion
+from ancf_petsc.analysis.motion import MotionAnalysis
 from ancf_petsc.analysis.run import run_case
 from ancf_petsc.errors import AncfError
 from ancf_petsc.motion.integration import TimeIntegration
@@ -51,7 +51,7 @@ class Followed:
 
     def __init__(self, data: dict[str, Any], look=None, comm: MPI.Comm = MPI.COMM_SELF) -> None:
         case = case_from_dict(data, PROJECT)
-        self.motion = Motion(case, build(case, comm))
+        self.motion = MotionAnalysis(case, build(case, comm))
         self.steps: list = []
         self.rows = [look(self.motion)] if look else []
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from ancf_petsc.parallel.slabs import slab_bounds
 from ancf_petsc.results.store import ResultStore
-from ancf_petsc.results.tables import Table
+from ancf_petsc.results.tables import CsvTable
 
 TITLE, UNITS, NOTE = "Cube, twisted", "mm, MPa, N", "A cube that nobody drew."
 TIMES = (0.0, 0.1, 1.0 / 3.0, 1.0)
@@ -76,11 +76,11 @@ def _write_tables(folder: Path) -> None:
         "min_det_F",
         "newton_iterations",
     )
-    with Table(folder / "curve.csv", columns) as curve:
+    with CsvTable(folder / "curve.csv", columns) as curve:
         for step, time in enumerate(TIMES):
             energy = 0.5 * 200.0 * (0.1 * time) ** 2
             curve.append([time, -0.1 * time, -20.0 * time, energy, energy, 1 - 0.5 * time, 3 * (step > 0)])
-    with Table(
+    with CsvTable(
         folder / "probes.csv", ("pseudo_time", *(f"top.{axis}" for axis in ("x", "y", "z", "ux", "uy", "uz")))
     ) as probes:
         for time in TIMES:

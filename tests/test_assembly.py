@@ -79,7 +79,7 @@ def test_patch_of_odd_cells_under_affine_boundary_values_is_in_constant_stress(m
     data = free_body(mesh, law) | {"groups": {"low": everywhere}}
     free = assembly_of(data, tmp_path)
     boundary = _outer_nodes(free)
-    free.model.motion[boundary] = 0
+    free.model.drive[boundary] = 0
     free = type(free)(free.model)
     F = np.array([[1.1, 0.2, 0.0], [-0.1, 0.9, 0.1], [0.05, 0.0, 1.2]])
     affine = free.model.reference @ F.T

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from ancf_petsc.input import CaseSpec, case_from_dict
 from ancf_petsc.input.methods import METHODS
-from ancf_petsc.input.schema import LAWS
+from ancf_petsc.material import LAWS
 
 PAGE = (Path(__file__).parents[1] / "docs" / "case-format.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)

@@ -106,7 +106,7 @@ def test_binary_and_unreadable_files_are_told(folder):
 
 def test_deeply_nested_brackets_are_told(folder):
     (folder / "case.toml").write_text("a = " + "[" * 5000)
-    assert "no valid TOML" in str(refusal(folder))
+    assert "not valid TOML" in str(refusal(folder))
 
 
 @pytest.mark.parametrize(

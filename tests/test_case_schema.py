@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input import Case, CaseSpec, case_from_dict
 from ancf_petsc.input.methods import METHODS
-from ancf_petsc.input.schema import LAWS
 
 STATICS = {
     "title": "block",
@@ -131,12 +130,6 @@ def test_a_case_travels_between_ranks_by_pickle():
 def test_the_text_of_a_case_reads_back_as_the_same_case():
     made = case(STATICS, {"groups": {"a b": {"box": [[0, 0, 0], [1, 1, 1]]}}, "title": 'quoted "name"\n'})
     assert case_from_dict(tomllib.loads(made.text), ".").spec == made.spec
-
-
-def test_laws_are_those_of_the_material_registry():
-    from ancf_petsc import material
-
-    assert tuple(material.LAWS) == LAWS
 
 
 # --- what it refuses: the key, and words of the message

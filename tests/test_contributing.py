@@ -4,6 +4,7 @@ import inspect
 import sys
 from itertools import product
 from types import ModuleType
+from typing import Annotated
 
 import numba
 import numpy as np
@@ -14,21 +15,27 @@ import test_family_dynamics
 import test_family_orders
 import test_kernel_generic
 from element_cells import SHAPES
+from mpi4py import MPI
+from pydantic import Field, create_model
 from tiny_meshes import quadratic_bricks
 
 from ancf_petsc import case_from_dict, cli, load_case, run
+from ancf_petsc.analysis.build import build
 from ancf_petsc.element import catalog
 from ancf_petsc.element.element import Element
-from ancf_petsc.input import methods
+from ancf_petsc.errors import CaseError
+from ancf_petsc.input import load, loads, messages, methods, schema
 from ancf_petsc.material import models
 from ancf_petsc.mesh.generate import make_mesh
+from ancf_petsc.plan import loads as plan_loads
+from ancf_petsc.plan import supports
 
 
-def code_of(project, heading):
-    """The Python block under a heading of CONTRIBUTING.md."""
+def code_of(project, heading, block=0):
+    """A Python block under a heading of CONTRIBUTING.md."""
     text = (project / "CONTRIBUTING.md").read_text(encoding="utf-8")
     section = text.split(f"## {heading}\n")[1].split("\n## ")[0]
-    return section.split("```python\n")[1].split("```")[0]
+    return section.split("```python\n")[1 + block].split("```")[0]
 
 
 @pytest.fixture
@@ -107,11 +114,12 @@ def test_the_new_element_runs_in_the_program(new_element, tmp_path):
     assert ends[0] == pytest.approx(-10 / (8 * 1e7 * 0.1**4 / 12), rel=0.05)
 
 
-def test_a_material_is_a_block(project):
-    """As machine code: P is the derivative of the energy and A that of P; no stress at F = I."""
-    namespace = {**vars(models), "LAWS": {}}
-    exec(code_of(project, "Add a material"), namespace)
-    law = namespace["LAWS"]["ciarlet"]
+def test_a_material_is_a_block(project, monkeypatch):
+    """As machine code: P is the derivative of the energy and A that of P; no stress at F = I. Cases may ask for it."""
+    monkeypatch.setattr(models, "LAWS", dict(models.LAWS))
+    exec(code_of(project, "Add a material"), {**vars(models), "LAWS": models.LAWS})
+    law = models.LAWS["ciarlet"]
+    load_case(project / "cases/pvc_block", ["material.law=ciarlet"])
     energy, stress, tangent = (numba.njit(f) for f in (law.energy, law.stress, law.tangent))
     p = law.parameters(1.0, 0.3)
     F = np.eye(3) + 0.2 * np.random.default_rng(7).normal(size=(3, 3))
@@ -127,6 +135,73 @@ def test_a_material_is_a_block(project):
             block = np.reshape(tangent(tuple(F.ravel()), tuple(unit[J]), tuple(unit[L]), p), (3, 3))
             np.testing.assert_allclose(block[:, k], slope[:, J], rtol=0, atol=1e-8)
     assert np.abs(stress(tuple(np.eye(3).ravel()), p)).max() == 0.0
+
+
+def model_of(folder, element, **tables):
+    """The model of a bar held at one end."""
+    mesh = make_mesh("bar", folder / "bar.msh", divisions=(2, 2, 1), hexahedra=element != "3413")
+    data = {
+        "title": "bar",
+        "mesh": {"file": mesh.name, "element": element},
+        "material": {"law": "svk", "young": 1e7, "poisson": 0.3},
+        "constraint": [{"group": "bottom", "fix": ["x", "y", "z"]}],
+        "statics": {},
+        **tables,
+    }
+    return build(case_from_dict(data, folder), MPI.COMM_SELF).model
+
+
+def change_cases(monkeypatch, **keys):
+    """Let cases have other keys than those of the schema."""
+    changed = create_model("CaseSpec", __base__=schema.CaseSpec, **keys)
+    for module in (load, messages):
+        monkeypatch.setattr(module, "CaseSpec", changed)
+
+
+def test_a_load_is_a_table_of_keys_and_a_file(project, monkeypatch, tmp_path):
+    """A traction is the force of traction times area, 0.1 x 0.1 m being its end."""
+    names = dict(vars(loads))
+    exec(code_of(project, "Add a load"), names)
+    types = loads.Types | names["TractionSpec"]
+    change_cases(monkeypatch, load=(tuple[Annotated[types, Field(discriminator="type")], ...], ()))
+    module = ModuleType("traction")
+    exec(code_of(project, "Add a load", 1), vars(module))
+    monkeypatch.setitem(plan_loads.KINDS, "traction", module)
+    for element in ("3413", "3843"):
+        found, expected = (
+            model_of(tmp_path, element, load=[{"group": "top", **load}]).loads[0].pattern
+            for load in (
+                {"type": "traction", "value": [0.0, 2.0, -3.0]},
+                {"type": "force", "total": [0.0, 0.02, -0.03]},
+            )
+        )
+        np.testing.assert_allclose(found, expected, atol=1e-15)
+        assert found.any()
+    tables = {"groups": {"tip": {"nearest": [0.0, 0.0, 0.5]}}}
+    tables["load"] = [{"type": "traction", "group": "tip", "value": [1.0, 0.0, 0.0]}]
+    with pytest.raises(CaseError, match=r"load\.0\.group: no surface: found 'tip', expected boundary faces"):
+        model_of(tmp_path, "3413", **tables)
+
+
+def test_a_support_is_a_key_and_a_file(project, monkeypatch, tmp_path):
+    """A clamp is what `fix` and `slopes` of all axes hold together."""
+    names = {"key": schema.key, "ConstraintSpec": schema.ConstraintSpec}
+    line = code_of(project, "Add a support")
+    exec("class Clamped(ConstraintSpec):\n    " + line, names)
+    clamped = names["Clamped"]
+    change_cases(monkeypatch, constraint=(tuple[clamped, ...], ()))
+    module = ModuleType("clamp")
+    exec(code_of(project, "Add a support", 1), vars(module))
+    monkeypatch.setattr(supports, "KINDS", [*supports.KINDS, module.enter])
+    axes = ["x", "y", "z"]
+    for element in ("3413", "3843"):
+        by_keys = {"group": "bottom", "fix": axes, **({"slopes": axes} if element == "3843" else {})}
+        found, expected = (
+            model_of(tmp_path, element, constraint=[row]).drive
+            for row in ({"group": "bottom", "clamp": True}, by_keys)
+        )
+        np.testing.assert_array_equal(found, expected)
+        assert (found >= 0).any()
 
 
 def test_an_integrator_is_a_file_and_a_line(project, monkeypatch, tmp_path):

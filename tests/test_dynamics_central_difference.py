@@ -12,7 +12,7 @@ from motion_cases import GRAVITY, HINGE, PROJECT, REFERENCE, Followed, body, pen
 from ancf_petsc import case_from_dict
 from ancf_petsc.analysis.run import run_case
 from ancf_petsc.errors import MotionStopped
-from ancf_petsc.motion.equations import Equations
+from ancf_petsc.motion.integrators import Integrator
 from ancf_petsc.results.tables import read_table
 
 METHOD = {"integrator": "central_difference"}
@@ -44,7 +44,7 @@ def test_compiled_loops_equal_single_steps(mass, damping, tmp_path, monkeypatch)
     """State, work and loss to rounding and to the order of the sums of work."""
     how = {"step": STEP, "mass": mass, "damping": damping}
     fast = curve_of(tmp_path / "fast", **how)
-    monkeypatch.setattr(Equations, "fused", None)
+    monkeypatch.setattr(Integrator, "fused", None)
     plain = curve_of(tmp_path / "plain", **how)
     assert fast["steps"].tolist() == plain["steps"].tolist() == [0, *[40] * 10]
     size = np.abs(plain["kinetic_energy"]).max()

@@ -9,11 +9,11 @@ from mpi4py import MPI
 
 from ancf_petsc import case_from_dict
 from ancf_petsc.analysis.build import build
-from ancf_petsc.analysis.motion import Motion
+from ancf_petsc.analysis.motion import MotionAnalysis
 from ancf_petsc.analysis.run import run_case
 from ancf_petsc.errors import MotionStopped
-from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.fused_newton import FusedNewton
+from ancf_petsc.motion.integrators import Integrator
 from ancf_petsc.results.tables import read_table
 from ancf_petsc.solve.petsc import petsc_options
 
@@ -28,7 +28,7 @@ def both_ways(tmp_path, monkeypatch, data):
     curves = []
     for way in ("compiled", "petsc"):
         if way == "petsc":
-            monkeypatch.setattr(Equations, "fused", None)
+            monkeypatch.setattr(Integrator, "fused", None)
         run_case(case_from_dict(data, PROJECT), tmp_path / way)
         curves.append(read_table(tmp_path / way / "curve.csv"))
     return curves
@@ -86,8 +86,8 @@ def test_a_step_that_fails_is_left_to_snes(monkeypatch):
 def test_an_option_for_petscs_solvers_goes_to_them(dynamics, options, compiled):
     case = case_from_dict(pendulum(dynamics), PROJECT)
     with petsc_options(options):
-        motion = Motion(case, build(case, MPI.COMM_SELF))
-        assert (motion.integrator._fused is not None) == compiled
+        motion = MotionAnalysis(case, build(case, MPI.COMM_SELF))
+        assert motion.integrator.is_compiled == compiled
         motion.destroy()
 
 
@@ -101,7 +101,7 @@ def test_loads_that_change_leave_adaptive_steps_to_petsc(tmp_path, monkeypatch):
 @pytest.mark.parametrize("dynamics", [ADAPTIVE, ALPHA])
 def test_a_state_that_is_not_finite_ends_the_loops(dynamics):
     case = case_from_dict(pendulum(dynamics), PROJECT)
-    motion = Motion(case, build(case, MPI.COMM_SELF))
+    motion = MotionAnalysis(case, build(case, MPI.COMM_SELF))
     motion.integrator.x.array[5] = np.nan
     motion.integrator.restart()
     with pytest.raises(

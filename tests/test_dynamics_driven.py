@@ -25,7 +25,7 @@ METHODS = {
 
 def driven_of(motion):
     model = motion.assembly.model
-    moved = model.motion[: model.owned, 2] >= 0
+    moved = model.drive[: model.owned, 2] >= 0
     z = motion.integrator.x.array_r.reshape(-1, 3)[moved, 2] - model.reference[: model.owned][moved, 2]
     return motion.integrator.time, z
 

@@ -35,7 +35,7 @@ def test_patch_of_odd_cells_under_affine_boundary_values_is_in_constant_stress(c
     body = held_all_around(code, unit_cube(code, 3, tmp_path, odd=True), tmp_path, rule=rule)
     gradient = PLANE if ELEMENTS[code].components == 2 else F
     affine = body.model.reference @ gradient.T
-    free = body.model.motion < 0
+    free = body.model.drive < 0
     x = body.reference_vector()
     disturbed = affine + 0.01 * free * np.random.default_rng(1).uniform(-1, 1, affine.shape)
     x.array[:] = disturbed.ravel()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ancf_petsc.input.schema import LAWS as NAMES_IN_CASES
 from ancf_petsc.material import LAWS
 from ancf_petsc.material.tensor import determinant, dot, gram, inverse_transpose, outer, transpose
 
@@ -90,10 +89,6 @@ def test_inside_out_cells_have_no_finite_neo_hooke_energy():
     F, p = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -0.1), law.parameters(1.0, 0.3)
     assert law.energy(F, p) == np.inf
     assert np.isnan(law.stress(F, p)).any()
-
-
-def test_the_case_format_knows_the_same_laws():
-    assert set(NAMES_IN_CASES) == set(LAWS)
 
 
 def test_tensor_functions_equal_numpy():

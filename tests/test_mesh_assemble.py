@@ -125,7 +125,7 @@ APART = [(0, 1, 2, 3), (5, 6, 7, 4)]
 
 def test_coincident_nodes_are_an_error_that_names_a_pair_and_the_cure():
     message = (
-        r"3 nodes lie on others, first nodes 11 and 15 at \(1, 0, 0\); "
+        r"3 nodes coincide with others, first nodes 11 and 15 at \(1, 0, 0\); "
         r'set mesh.duplicates = "merge" to join them or "keep"'
     )
     with pytest.raises(MeshError, match=message):
@@ -135,7 +135,7 @@ def test_coincident_nodes_are_an_error_that_names_a_pair_and_the_cure():
 def test_coincident_nodes_are_kept_on_demand():
     mesh = tetrahedra(SPLIT, APART, duplicates="keep")
     assert len(mesh.points) == 8
-    assert mesh.notes == ["3 nodes lie on others: kept apart"]
+    assert mesh.notes == ['3 coincident nodes kept separate (mesh.duplicates = "keep")']
 
 
 def test_merging_joins_cells_parts_and_groups():

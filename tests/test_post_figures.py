@@ -14,7 +14,7 @@ from ancf_petsc.cli import main
 from ancf_petsc.post import figures
 from ancf_petsc.post.reference import read_level, read_reference
 from ancf_petsc.results.reader import open_results
-from ancf_petsc.results.tables import Table
+from ancf_petsc.results.tables import CsvTable
 
 mpl.use("Agg")
 
@@ -58,7 +58,7 @@ def _close_figures():
 
 
 def _write(path, columns):
-    with Table(path, list(columns)) as table:
+    with CsvTable(path, list(columns)) as table:
         for row in zip(*columns.values(), strict=True):
             table.append(row)
 
@@ -187,7 +187,7 @@ def test_plot_draws_components_one_above_the_other(motion, tmp_path, capsys):
     ("arguments", "message"),
     [
         (["--probe", "top.w"], "--probe: no such component of a probe: found 'top.w'; did you mean 'top."),
-        (["--level", "a=1"], "--level: of what?; name a component with --probe, as in --probe tip.z"),
+        (["--level", "a=1"], "--level: needs a probe component; such as --probe tip.z"),
         (["--probe", "top.z", "--level", "0.1"], "--level: found '0.1', expected LABEL=NUMBER"),
         (["--reference", "FILE"], "no curve to lay over the run: found 'columns t, z', expected time or"),
     ],

@@ -132,7 +132,7 @@ def test_view_of_a_case_before_it_is_solved(project, tmp_path):
         (["--screenshot", "a.gif"], 2, "--screenshot: found 'a.gif', expected a file name that ends in .png"),
         (["--screenshot", "none/a.png"], 2, "--screenshot: no such folder: found 'none'"),
         (["--movie", "a.mp4"], 2, "--movie: found 'a.mp4', expected a file name that ends in .gif"),
-        (["--set", "a=1"], 2, "--set: a run has been solved"),
+        (["--set", "a=1"], 2, "--set: applies to cases; this is a finished run"),
     ],
 )
 def test_wrong_words_are_told(results, capsys, arguments, code, message):

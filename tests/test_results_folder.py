@@ -66,7 +66,7 @@ def test_files_of_others_are_protected(tmp_path):
     (tmp_path / "thesis.tex").write_text("all my work")
     before = snapshot(tmp_path)
     message = refused(tmp_path)
-    assert "not empty: found 'files that are no run'" in message
+    assert "not empty: found 'files that do not belong to a run'" in message
     assert "--force" in message
     check_folder(tmp_path, "Block", force=True)
     assert snapshot(tmp_path) == before

@@ -8,13 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ancf_petsc.errors import CaseError
-from ancf_petsc.results.tables import Table, read_table
+from ancf_petsc.results.tables import CsvTable, read_table
 
 
 @given(st.lists(st.floats(allow_nan=True, allow_infinity=True), min_size=1, max_size=20))
 def test_floats_come_back_bit_for_bit(tmp_path_factory, values):
     path = tmp_path_factory.mktemp("table") / "t.csv"
-    with Table(path, ["value", "row"]) as table:
+    with CsvTable(path, ["value", "row"]) as table:
         for row, value in enumerate(values):
             table.append([value, row])
     read = read_table(path)
@@ -26,7 +26,7 @@ def test_floats_come_back_bit_for_bit(tmp_path_factory, values):
 
 def test_a_row_is_on_disk_when_append_returns(tmp_path):
     path = tmp_path / "t.csv"
-    table = Table(path, ["time", "force"])
+    table = CsvTable(path, ["time", "force"])
     assert path.read_text() == "time,force\n"
     table.append({"force": np.float64(-0.1), "time": np.int64(2)})
     assert path.read_text() == "time,force\n2,-0.1\n"
@@ -35,7 +35,7 @@ def test_a_row_is_on_disk_when_append_returns(tmp_path):
 
 def test_odd_names_of_groups_survive(tmp_path):
     names = ['end, "left".rx', "größe.z"]
-    with Table(tmp_path / "t.csv", names) as table:
+    with CsvTable(tmp_path / "t.csv", names) as table:
         table.append([1.0, 2.0])
     assert {name: column.tolist() for name, column in read_table(tmp_path / "t.csv").items()} == {
         names[0]: [1.0],
@@ -49,7 +49,7 @@ def test_a_line_cut_short_is_left_out(tmp_path):
 
 
 def test_a_table_without_rows_has_empty_columns(tmp_path):
-    Table(tmp_path / "t.csv", ["a", "b"]).close()
+    CsvTable(tmp_path / "t.csv", ["a", "b"]).close()
     assert {name: column.size for name, column in read_table(tmp_path / "t.csv").items()} == {"a": 0, "b": 0}
 
 
@@ -58,7 +58,7 @@ def test_a_table_without_rows_has_empty_columns(tmp_path):
     [([1.0], "1 values for 2 columns"), ({"a": 1.0, "c": 2.0}, r"columns \['b', 'c'\] do not match")],
 )
 def test_a_row_that_does_not_fit_is_refused(tmp_path, row, message):
-    with Table(tmp_path / "t.csv", ["a", "b"]) as table, pytest.raises(ValueError, match=message):
+    with CsvTable(tmp_path / "t.csv", ["a", "b"]) as table, pytest.raises(ValueError, match=message):
         table.append(row)
 
 

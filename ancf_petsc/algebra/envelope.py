@@ -33,7 +33,7 @@ def envelope(pointers, columns):
 
 @register_jitable(fastmath=REGROUPED)
 def dot(a, b):
-    """Of two vectors, in any order of the sum."""
+    """Dot product; the compiler may reorder the sum."""
     total = 0.0
     for k in range(a.size):
         total += a[k] * b[k]

@@ -57,11 +57,11 @@ def static_answer(case: Case, assembly: Assembly) -> PETSc.Vec:
     model = assembly.model
     linear = Ramp("linear")
     loads = [replace(load, pattern=load.ramp.value(1.0) * load.pattern, ramp=linear) for load in model.loads]
-    motions = [
-        replace(motion, amplitude=motion.value(1.0), ramp=linear) if motion.amplitude else motion
-        for motion in model.motions
+    drives = [
+        replace(drive, amplitude=drive.value(1.0), ramp=linear) if drive.amplitude else drive
+        for drive in model.drives
     ]
-    newton = Newton(Assembly(replace(model, loads=loads, motions=motions)), STATIC_TOLERANCE)
+    newton = Newton(Assembly(replace(model, loads=loads, drives=drives)), STATIC_TOLERANCE)
     path = LoadPath(newton, [1.0], [], SMALLEST_STEP, lambda step, x: None)
     try:
         path.run()

@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from ancf_petsc.analysis.build import build_from
 from ancf_petsc.analysis.damping import static_answer
-from ancf_petsc.analysis.drawn_points import DrawnPoints
 from ancf_petsc.analysis.host.versions import program_version
+from ancf_petsc.analysis.output_points import OutputPoints
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input.load import Case
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.mass import Mass
 from ancf_petsc.parallel.exchange import on_root
-from ancf_petsc.plan.plan import draw
+from ancf_petsc.plan.plan import make_plan
 from ancf_petsc.results.folder import check_folder, claim_folder
 from ancf_petsc.results.store import ResultStore
-from ancf_petsc.results.tables import Table
+from ancf_petsc.results.tables import CsvTable
 from ancf_petsc.solve.modes import Modes, modes_at
 from ancf_petsc.solve.petsc import petsc_options, refuse_unused
 
@@ -42,7 +42,7 @@ def find_modes(
     _need_density(case)
     on_root(comm, lambda: check_folder(folder, title, force=force))
     with petsc_options(case.spec.petsc):
-        built = build_from(case, on_root(comm, lambda: draw(case)), comm)
+        built = build_from(case, on_root(comm, lambda: make_plan(case)), comm)
         assembly = Assembly(built.model)
         lumped = case.spec.dynamics is not None and case.spec.dynamics.mass == "lumped"
         mass = Mass(assembly, lumped=lumped)
@@ -52,7 +52,7 @@ def find_modes(
     on_root(comm, lambda: claim_folder(folder))
     rows = _rows(modes)
     if comm.rank == 0:
-        with Table(folder / "modes.csv", COLUMNS) as table:
+        with CsvTable(folder / "modes.csv", COLUMNS) as table:
             for row in rows:
                 table.append(row)
     store = ResultStore(folder, comm, title, case.spec.units, note=case.spec.note, version=program_version())
@@ -60,12 +60,12 @@ def find_modes(
     store.write_mesh(
         order.points, order.kind, order.cells, order.node_numbers, order.cell_numbers, order.groups
     )
-    drawn = DrawnPoints(assembly, order)
+    points = OutputPoints(assembly, order)
     before = x.array_r.reshape(-1, 3) - built.model.reference[: built.model.owned]
     for row, shape in zip(rows, modes.shapes, strict=True):
         largest = comm.allreduce(float(np.abs(shape[built.model.own_positions]).max(initial=0.0)), MPI.MAX)
         shown = before + LARGEST_SHOWN * built.model.size / largest * shape
-        fields = {"displacement": drawn(shown)}
+        fields = {"displacement": points(shown)}
         store.write_step(row[0], fields, {}, {"frequency": row[1]})
     return rows
 

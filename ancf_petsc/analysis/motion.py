@@ -19,13 +19,13 @@ from ancf_petsc.input.schema import InitialSpec
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.mass import Mass
 from ancf_petsc.motion.equations import Equations
-from ancf_petsc.motion.integration import steps_in, warn_of_long_step
-from ancf_petsc.motion.integrators import Settings, integrator
+from ancf_petsc.motion.integration import warn_of_long_step
+from ancf_petsc.motion.integrators import Settings, integrator, steps_in
 
 log = logging.getLogger("ancf")
 
 
-class Motion:
+class MotionAnalysis:
     """A body ready to move. times: of the outputs after the start."""
 
     def __init__(self, case: Case, built: Built) -> None:
@@ -53,7 +53,7 @@ class Motion:
         """
         spec, interval = self.spec, self.spec.duration / self.spec.outputs
         if spec.step is None:
-            return Settings(0.0, spec.tolerance or 0.0, spec.spectral_radius, spec.theta, spec.order)
+            return Settings(0.0, spec.tolerance or 0.0, spec.option)
         size = interval / steps_in(interval, spec.step)
         if abs(size - spec.step) > 1e-9 * spec.step:
             log.info(
@@ -63,7 +63,7 @@ class Motion:
                 round(interval / size),
                 interval,
             )
-        return Settings(size, 0.0, spec.spectral_radius, spec.theta, spec.order)
+        return Settings(size, 0.0, spec.option)
 
     def prepare(self) -> None:
         """Set the solvers up, so that every option has been asked for."""
@@ -89,7 +89,7 @@ class Motion:
         self, record: Record, clock: Clock, watch: Callable[[float], None], stop: Callable[[], bool]
     ) -> MotionRun:
         """The run, ready to go."""
-        return MotionRun(self, record, clock, watch, stop)
+        return MotionRun(self.integrator, self.times, record, clock, watch, stop)
 
     def destroy(self) -> None:
         """Free PETSc's objects."""

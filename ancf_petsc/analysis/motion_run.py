@@ -4,56 +4,54 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ancf_petsc.analysis.host.clock import Clock
-from ancf_petsc.analysis.record import Record
+from ancf_petsc.analysis.record import COUNTS, Record
+from ancf_petsc.axes import AXES
 from ancf_petsc.errors import Interrupted, MotionStopped
 from ancf_petsc.log import STEPS
-from ancf_petsc.model.measures import AXES, conjugates
+from ancf_petsc.model.measures import conjugates
 from ancf_petsc.model.motion_work import MotionWork, Powers
 from ancf_petsc.motion.integration import TimeIntegration
-from ancf_petsc.motion.integrators import Step
+from ancf_petsc.motion.integrators import Integrator, Step
 from ancf_petsc.parallel.exchange import combined
 
-if TYPE_CHECKING:
-    from ancf_petsc.analysis.motion import Motion
-
-COUNTS = ("newton_iterations", "linear_iterations", "steps", "rejected_steps")
+MOTION_COUNTS = (*COUNTS, "rejected_steps")
 log = logging.getLogger(STEPS)
 
 
 class MotionRun:
-    """Follows a motion and records it. watch: told the part done, 0 to 1. stop: whether to end after this
-    step.
+    """Follows a motion and records it. times: of the outputs after the start. watch(part): called with the part done,
+    0 to 1. stop(): whether to end after this step.
     """
 
     def __init__(
         self,
-        motion: Motion,
+        integrator: Integrator,
+        times: Sequence[float],
         record: Record,
         clock: Clock,
         watch: Callable[[float], None],
         stop: Callable[[], bool],
     ) -> None:
         self.record, self.clock, self.watch = record, clock, watch
-        self.integrator, self.equations, self.mass = motion.integrator, motion.equations, motion.mass
-        self.assembly = motion.assembly
-        self.duration = motion.spec.duration
-        self.times = set(motion.times)
-        self.totals = dict.fromkeys(COUNTS, 0)
-        self._since = dict.fromkeys(COUNTS, 0)
+        self.integrator, self.equations = integrator, integrator.equations
+        self.mass, self.assembly = self.equations.mass, self.equations.assembly
+        self.duration = self.equations.duration
+        self.times = set(times)
+        self.totals = dict.fromkeys(MOTION_COUNTS, 0)
+        self._since = dict.fromkeys(MOTION_COUNTS, 0)
         model = self.assembly.model
-        self.work = MotionWork(model.motions, model.loads, self.duration)
+        self.work = MotionWork(model.drives, model.loads, self.duration)
         self._ramped = any(load.ramp.kind != "constant" for load in model.loads)
         self._kinetic = 0.0
         self._start_energy = 0.0
         self._begun = time.perf_counter()
-        self.path = TimeIntegration(self.integrator, motion.times, self._on_step, self._on_corner, stop)
+        self.path = TimeIntegration(integrator, times, self._on_step, self._on_corner, stop)
 
     def go(self) -> None:
         """To the end. Raises MotionStopped or Interrupted, with the last good state saved."""
@@ -72,7 +70,9 @@ class MotionRun:
     # --- steps
 
     def _on_step(self, step: Step) -> None:
-        for name, count in zip(COUNTS, (step.newton, step.linear, step.count, step.rejected), strict=True):
+        for name, count in zip(
+            MOTION_COUNTS, (step.newton, step.linear, step.count, step.rejected), strict=True
+        ):
             self.totals[name] += count
             self._since[name] += count
         if step.time in self.path.corners:
@@ -87,7 +87,7 @@ class MotionRun:
         if step.known is not None:
             self.work.add_known(*step.known)
             return
-        often = self.equations.damping or self.equations.moving or self._ramped
+        often = self.equations.damping or self.equations.is_driven or self._ramped
         if often or step.time in self.times or step.time in self.path.corners:
             self.work.add(step.time, self._powers())
 
@@ -99,10 +99,10 @@ class MotionRun:
         """Loss, and what loads and driven nodes see; accelerations only where they are needed."""
         equations, v, model = self.equations, self._velocity(), self.assembly.model
         loss, loss_rate, balance = 0.0, 0.0, np.zeros_like(v)
-        if equations.damping or equations.moving:
+        if equations.damping or equations.is_driven:
             a, carried = self._acceleration(), self.mass.times(v)
             loss, loss_rate = float(np.vdot(v, carried)), 2 * float(np.vdot(a, carried))
-            if equations.moving:
+            if equations.is_driven:
                 balance = equations.out_of_balance(self.integrator.time, self.integrator.x, v, a)
         rates = [float(np.vdot(load.pattern, v)) for load in model.loads]
         loss, loss_rate, *rates = combined(self.assembly.comm, np.array([loss, loss_rate, *rates]))
@@ -128,7 +128,7 @@ class MotionRun:
             more = {**self._energies(), **self._momenta(), **self._since}
             row = self.record.write({"time": now}, x, balance, more, {"velocity": v})
             self._tell(row)
-        self._since = dict.fromkeys(COUNTS, 0)
+        self._since = dict.fromkeys(MOTION_COUNTS, 0)
         self._written = now
 
     def _energies(self) -> dict[str, float]:

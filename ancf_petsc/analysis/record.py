@@ -11,14 +11,19 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.analysis.build import Built
-from ancf_petsc.analysis.drawn_points import DrawnPoints
+from ancf_petsc.analysis.output_points import OutputPoints
+from ancf_petsc.axes import AXES
 from ancf_petsc.input.schema import CaseSpec
 from ancf_petsc.model.assembly import Assembly
-from ancf_petsc.model.measures import AXES, mean_position, mean_stress, reaction, von_mises
+from ancf_petsc.model.measures import mean_position, mean_stress, reaction, von_mises
 from ancf_petsc.parallel.exchange import ToSlabs, combined
-from ancf_petsc.plan.plan import STROKE
+from ancf_petsc.plan.curve import STROKE
+from ancf_petsc.plan.probes import name_of
 from ancf_petsc.results.store import ResultStore
-from ancf_petsc.results.tables import Table
+from ancf_petsc.results.tables import CsvTable
+
+COUNTS = ("newton_iterations", "linear_iterations", "steps")
+"""Columns of what a run did since its last output."""
 
 
 class Record:
@@ -31,9 +36,9 @@ class Record:
         self.assembly = assembly
         self.comm = assembly.comm
         self.row: dict[str, float] = {}
-        self._tables: dict[str, Table] = {}
+        self._tables: dict[str, CsvTable] = {}
         order, numbering = built.order, assembly.model.numbering
-        self._drawn = DrawnPoints(assembly, order)
+        self._points = OutputPoints(assembly, order)
         own = np.flatnonzero(numbering.own_cells)
         self._cells = ToSlabs(self.comm, numbering.file_cells[own], order.total_cells, of=own)
         self._store = ResultStore(folder, self.comm, spec.title, spec.units, note=spec.note, version=version)
@@ -69,9 +74,9 @@ class Record:
             self._append("probes.csv", {**time, **self._probes(x)})
         positions, model = x.array_r.reshape(-1, 3), self.assembly.model
         nodes = {"displacement": positions - model.reference[: model.owned], **(node_fields or {})}
-        points = {name: self._drawn(rows) for name, rows in nodes.items()}
+        points = {name: self._points(rows) for name, rows in nodes.items()}
         if model.element.has_slopes:
-            points["slopes"] = self._drawn.slopes(positions)
+            points["slopes"] = self._points.slopes(positions)
         cells = {"det_F": det, "von_mises": von_mises(cauchy), "cauchy": cauchy, "green_lagrange": strain}
         del strain, cauchy
         (now,) = time.values()
@@ -122,7 +127,7 @@ class Record:
     def _probes(self, x: PETSc.Vec) -> dict[str, float]:
         columns: dict[str, float] = {}
         for probe in self.spec.probe:
-            position, displacement = mean_position(self.assembly, x, f"probe {probe.name}")
+            position, displacement = mean_position(self.assembly, x, name_of(probe))
             columns |= {f"{probe.name}.{axis}": position[i] for i, axis in enumerate(AXES)}
             columns |= {f"{probe.name}.u{axis}": displacement[i] for i, axis in enumerate(AXES)}
         return columns
@@ -131,5 +136,5 @@ class Record:
         if self.comm.rank:
             return
         if file not in self._tables:
-            self._tables[file] = Table(self.folder / file, list(row))
+            self._tables[file] = CsvTable(self.folder / file, list(row))
         self._tables[file].append(row)

@@ -15,7 +15,7 @@ from ancf_petsc.analysis.host.clock import Clock
 from ancf_petsc.analysis.host.signals import StopRequest
 from ancf_petsc.analysis.host.versions import program_version, versions
 from ancf_petsc.analysis.record import Record
-from ancf_petsc.analysis.statics import Statics
+from ancf_petsc.analysis.statics import StaticAnalysis
 from ancf_petsc.element.catalog import element
 from ancf_petsc.errors import Interrupted
 from ancf_petsc.input.load import Case
@@ -23,12 +23,12 @@ from ancf_petsc.kernel.warmup import compile_kernels, is_compiled
 from ancf_petsc.log import log_file
 from ancf_petsc.material import law_named
 from ancf_petsc.parallel.exchange import agree, on_root
-from ancf_petsc.plan.plan import Blueprint, draw
+from ancf_petsc.plan.plan import Plan, make_plan
 from ancf_petsc.results.folder import check_folder, claim_folder, write_summary
 from ancf_petsc.solve.petsc import petsc_options, refuse_unused, refuse_wrong_values
 
 if TYPE_CHECKING:
-    from ancf_petsc.analysis.motion import Motion
+    from ancf_petsc.analysis.motion import MotionAnalysis
 
 log = logging.getLogger("ancf")
 
@@ -53,11 +53,11 @@ def run_case(
     on_root(comm, lambda: check_folder(folder, case.spec.title, force=force))
     with petsc_options(case.spec.petsc):
         with clock.part("read"):
-            blueprint = on_root(comm, lambda: _read(case))
+            plan = on_root(comm, lambda: _read(case))
         with clock.part("setup"), refuse_wrong_values(case.spec.petsc):
             _compile(case, comm)
-            built = build_from(case, blueprint, comm)
-            del blueprint
+            built = build_from(case, plan, comm)
+            del plan
             solver = _solver(case, built)
         try:
             if case.spec.petsc:
@@ -72,20 +72,20 @@ def run_case(
     return folder
 
 
-def _solver(case: Case, built: Built) -> Statics | Motion:
+def _solver(case: Case, built: Built) -> StaticAnalysis | MotionAnalysis:
     """What solves the case; what motion needs is imported for motion only."""
     if case.spec.dynamics is None:
-        return Statics(case, built)
-    from ancf_petsc.analysis.motion import Motion
+        return StaticAnalysis(case, built)
+    from ancf_petsc.analysis.motion import MotionAnalysis
 
-    return Motion(case, built)
+    return MotionAnalysis(case, built)
 
 
-def _read(case: Case) -> Blueprint:
-    blueprint = draw(case)
-    for note in blueprint.mesh.notes:
+def _read(case: Case) -> Plan:
+    plan = make_plan(case)
+    for note in plan.mesh.notes:
         log.warning("%s", note)
-    return blueprint
+    return plan
 
 
 def _compile(case: Case, comm: MPI.Comm) -> None:
@@ -94,7 +94,7 @@ def _compile(case: Case, comm: MPI.Comm) -> None:
     row = element(case.spec.mesh.element)
     dynamics = case.spec.dynamics
     moving = dynamics is not None
-    mean = dynamics is not None and dynamics.integrator == "energy_momentum"
+    mean = dynamics is not None and dynamics.method.conserves
     if comm.rank == 0 and not is_compiled(row, laws, mean=mean, moving=moving):
         log.info("compiling kernels (%s): once, under a minute", ", ".join(law.name for law in laws))
     on_root(comm, lambda: compile_kernels(row, laws, mean=mean, moving=moving))
@@ -103,7 +103,7 @@ def _compile(case: Case, comm: MPI.Comm) -> None:
 def _solve(
     case: Case,
     built: Built,
-    solver: Statics | Motion,
+    solver: StaticAnalysis | MotionAnalysis,
     folder: Path,
     clock: Clock,
     watch: Callable[[float], None],

@@ -10,19 +10,18 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.analysis.host.clock import Clock
-from ancf_petsc.analysis.record import Record
+from ancf_petsc.analysis.record import COUNTS, Record
 from ancf_petsc.errors import Interrupted, NoEquilibrium
 from ancf_petsc.log import STEPS
 from ancf_petsc.model.measures import conjugates
 from ancf_petsc.model.work import PathWork
-from ancf_petsc.solve.load_path import LoadPath, Step
+from ancf_petsc.solve.load_path import LoadPath, PathStep
 from ancf_petsc.solve.newton import Newton
 
 log = logging.getLogger(STEPS)
-COUNTS = ("newton_iterations", "linear_iterations", "steps")
 
 
-class QuasiStaticRun:
+class StaticRun:
     """Follows the load path and records it.
 
     times: pseudo-times of the outputs. watch: told the part of the path done, 0 to 1. stop: asked after each
@@ -45,9 +44,9 @@ class QuasiStaticRun:
         self.totals = dict.fromkeys(COUNTS, 0)
         self._since = dict.fromkeys(COUNTS, 0)
         model = self.assembly.model
-        ramps = [motion.ramp for motion in model.motions] + [load.ramp for load in model.loads]
+        ramps = [drive.ramp for drive in model.drives] + [load.ramp for load in model.loads]
         self.corners = {corner for ramp in ramps for corner in ramp.corners()}
-        self.work = PathWork(model.motions, model.loads)
+        self.work = PathWork(model.drives, model.loads)
         self.path = LoadPath(newton, times, sorted(self.corners), smallest_step, self._on_step, stop)
 
     def go(self) -> None:
@@ -61,7 +60,7 @@ class QuasiStaticRun:
             self._save_last_state()
             raise
 
-    def _on_step(self, step: Step, x: PETSc.Vec) -> None:
+    def _on_step(self, step: PathStep, x: PETSc.Vec) -> None:
         out_of_balance = self.newton.out_of_balance(x)
         scalars = conjugates(self.assembly, x, out_of_balance)
         self.work.add(step.s, *scalars)
@@ -87,7 +86,7 @@ class QuasiStaticRun:
             self.newton.set_pseudo_time(self.path.s)
             self._write(self.path.s, self.path.x, self.newton.out_of_balance(self.path.x))
 
-    def _tell(self, step: Step, x: PETSc.Vec, out_of_balance: NDArray) -> None:
+    def _tell(self, step: PathStep, x: PETSc.Vec, out_of_balance: NDArray) -> None:
         curve = self.record.curve(x, out_of_balance)
         shown = "".join(f"  {name} {value:12.6g}" for name, value in curve.items())
         log.info(

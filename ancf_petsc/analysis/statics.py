@@ -7,14 +7,14 @@ from collections.abc import Callable
 from ancf_petsc.analysis.build import Built
 from ancf_petsc.analysis.host.clock import Clock
 from ancf_petsc.analysis.record import Record
-from ancf_petsc.analysis.static_run import QuasiStaticRun
+from ancf_petsc.analysis.static_run import StaticRun
 from ancf_petsc.input.load import Case
 from ancf_petsc.model.assembly import Assembly
-from ancf_petsc.plan.plan import output_times
+from ancf_petsc.plan.outputs import output_times
 from ancf_petsc.solve.newton import Newton
 
 
-class Statics:
+class StaticAnalysis:
     """A body ready to be loaded."""
 
     def __init__(self, case: Case, built: Built) -> None:
@@ -38,9 +38,9 @@ class Statics:
 
     def begin(
         self, record: Record, clock: Clock, watch: Callable[[float], None], stop: Callable[[], bool]
-    ) -> QuasiStaticRun:
+    ) -> StaticRun:
         """The run, ready to go."""
-        return QuasiStaticRun(self.newton, record, self.times, self.spec.smallest_step, clock, watch, stop)
+        return StaticRun(self.newton, record, self.times, self.spec.smallest_step, clock, watch, stop)
 
     def destroy(self) -> None:
         """Free PETSc's objects."""

@@ -16,7 +16,7 @@ from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.model.measures import reaction
 from ancf_petsc.parallel.exchange import on_root
-from ancf_petsc.plan.plan import draw
+from ancf_petsc.plan.plan import make_plan
 
 STRETCH = 0.9
 
@@ -62,7 +62,7 @@ def _result(seconds: list[float], rounds: int, cells: int, error: float) -> dict
 def _body(comm: MPI.Comm, mesh: str) -> tuple[Assembly, int]:
     """The block, ready to be assembled, and its number of elements."""
     case = comm.bcast(on_root(comm, lambda: case_from_dict(block(mesh, 0.001, 1), ".", "block")))
-    built = build_from(case, on_root(comm, lambda: draw(case)), comm)
+    built = build_from(case, on_root(comm, lambda: make_plan(case)), comm)
     return Assembly(built.model), built.order.total_cells
 
 

@@ -21,7 +21,7 @@ from mpi4py import MPI
 from ancf_petsc.analysis.build import build, build_from
 from ancf_petsc.analysis.host.versions import versions
 from ancf_petsc.analysis.run import run_case
-from ancf_petsc.analysis.statics import Statics
+from ancf_petsc.analysis.statics import StaticAnalysis
 from ancf_petsc.bench.elements import compile_catalogue, points
 from ancf_petsc.bench.kernels import residual, tangent
 from ancf_petsc.bench.meshes import mesh_path
@@ -34,7 +34,7 @@ from ancf_petsc.errors import NoEquilibrium
 from ancf_petsc.input.load import Case, case_from_dict
 from ancf_petsc.mesh.read import read_mesh
 from ancf_petsc.parallel.exchange import on_root
-from ancf_petsc.plan.plan import draw_on
+from ancf_petsc.plan.plan import plan_on
 from ancf_petsc.results.reader import open_results
 
 Result = dict[str, Any]
@@ -101,11 +101,11 @@ def set_up(comm: MPI.Comm, *, problem: dict[str, Any], repetitions: int) -> Resu
         clock = _Splits(comm, seconds)
         mesh: Any = on_root(comm, lambda: read_mesh(case.mesh_file, kinds))
         clock.split("read")
-        blueprint = on_root(comm, partial(draw_on, case, mesh))
+        plan = on_root(comm, partial(plan_on, case, mesh))
         clock.split("tables")
-        built = build_from(case, blueprint, comm)
+        built = build_from(case, plan, comm)
         clock.split("distribute")
-        solver = Statics(case, built)
+        solver = StaticAnalysis(case, built)
         solver.assembly.tangent(solver.assembly.reference_vector(), solver.newton.matrix)
         clock.split("assemble")
         own = built.model.volumes[built.model.numbering.own_cells].sum()

@@ -12,7 +12,7 @@ from ancf_petsc.bench.problems import block
 from ancf_petsc.bench.yardstick import timed
 from ancf_petsc.input.load import case_from_dict
 from ancf_petsc.parallel.exchange import on_root
-from ancf_petsc.plan.plan import draw
+from ancf_petsc.plan.plan import make_plan
 
 SMALL, LARGE, ROUNDS = 8, 2**23, 200
 
@@ -20,9 +20,9 @@ SMALL, LARGE, ROUNDS = 8, 2**23, 200
 def messages(comm: MPI.Comm, *, mesh: str, repetitions: int) -> dict[str, Any]:
     """The most ghosts, neighbours and elements over its share that a rank has of a divided mesh."""
     case = comm.bcast(on_root(comm, lambda: case_from_dict(block(mesh, 0.001, 1), ".", "block")))
-    built = build_from(case, on_root(comm, lambda: draw(case)), comm)
+    built = build_from(case, on_root(comm, lambda: make_plan(case)), comm)
     model = built.model
-    starts = np.array(comm.allgather(model.start))
+    starts = np.cumsum([0, *comm.allgather(model.owned)])[:-1]
     neighbours = len(np.unique(np.searchsorted(starts, model.ghost_numbers, side="right")))
     ghosts = comm.allreduce(len(model.ghost_numbers), MPI.MAX)
     cells = comm.allreduce(len(model.cells), MPI.MAX)

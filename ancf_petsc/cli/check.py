@@ -10,7 +10,7 @@ from ancf_petsc.launcher import quick_if_alone
 
 if TYPE_CHECKING:
     from ancf_petsc.input.load import Case
-    from ancf_petsc.plan.plan import Blueprint
+    from ancf_petsc.plan.plan import Plan
 
 HELP = "check a case and its mesh, solve nothing"
 PETSC_OPTIONS = True
@@ -26,26 +26,26 @@ def execute(arguments: argparse.Namespace) -> int:
 
     from ancf_petsc.input.load import load_case
     from ancf_petsc.parallel.exchange import on_root
-    from ancf_petsc.plan.plan import draw
+    from ancf_petsc.plan.plan import make_plan
 
     comm = MPI.COMM_WORLD
 
     def show() -> None:
         case = load_case(arguments.case, changes(arguments), arguments.petsc_options)
-        blueprint = draw(case)
-        _print_mesh(blueprint)
-        _print_case(case, blueprint)
-        print("the case is good")
+        plan = make_plan(case)
+        _print_mesh(plan)
+        _print_case(case, plan)
+        print("case is valid")
 
     on_root(comm, show)
     return 0
 
 
-def _print_mesh(blueprint: Blueprint) -> None:
+def _print_mesh(plan: Plan) -> None:
     from ancf_petsc.cli.console import show_facts, show_table
     from ancf_petsc.mesh.check import statistics
 
-    mesh = blueprint.mesh
+    mesh = plan.mesh
     found = statistics(mesh)
     worst = f"worst {found.worst_quality:.3f} in element {found.worst_cell}"
     low, high = found.box
@@ -54,7 +54,7 @@ def _print_mesh(blueprint: Blueprint) -> None:
         [
             ("mesh", mesh.source),
             ("nodes", f"{found.nodes}{unused}"),
-            ("elements", f"{found.cells} of {blueprint.element.code}"),
+            ("elements", f"{found.cells} of {plan.element.code}"),
             ("pieces", found.pieces),
             ("box", " x ".join(f"[{a:.6g}, {b:.6g}]" for a, b in zip(low, high, strict=True))),
             ("volume", found.volume),
@@ -75,25 +75,25 @@ def _print_mesh(blueprint: Blueprint) -> None:
     show_table(["group", "nodes", "lines", "faces", "elements", "length", "area", "volume"], rows)
 
 
-def _print_case(case: Case, blueprint: Blueprint) -> None:
+def _print_case(case: Case, plan: Plan) -> None:
     import numpy as np
 
     from ancf_petsc.analysis.host.memory import memory_estimate
     from ancf_petsc.cli.console import show_facts
 
     spec = case.spec
-    dof = blueprint.element.components * blueprint.space.vectors
-    driven = dof - int((blueprint.constraints.motion < 0).sum())
+    dof = plan.element.components * plan.space.vectors
+    driven = dof - int((plan.supports.drive < 0).sum())
     facts: list[tuple[str, object]] = [
         ("case", spec.title),
         ("analysis", _analysis(case)),
         ("degrees of freedom", f"{dof}, {driven} of them held or moved"),
         (
             "memory",
-            f"about {memory_estimate(len(blueprint.space.cells), dof) / 1e9:.2g} GB, and 0.25 GB for each further rank",
+            f"about {memory_estimate(len(plan.space.cells), dof) / 1e9:.2g} GB, and 0.25 GB for each further rank",
         ),
     ]
-    counts = np.bincount(blueprint.material, minlength=len(spec.material))
+    counts = np.bincount(plan.material, minlength=len(spec.material))
     for material, count in zip(spec.material, counts, strict=True):
         density = f", density {material.density:g}" if material.density else ""
         moduli = f"young {material.young:g}, poisson {material.poisson:g}"
@@ -106,16 +106,15 @@ def _print_case(case: Case, blueprint: Blueprint) -> None:
             ["moves " + ", ".join(moved)] if moved else []
         )
         words += ["holds slopes in " + ", ".join(constraint.slopes)] if constraint.slopes else []
-        nodes = int(blueprint.members[constraint.group].sum())
+        nodes = int(plan.members[constraint.group].sum())
         facts.append(("constraint", f"{constraint.group}, {nodes} nodes: {'; '.join(words)}"))
     for load in spec.load:
-        what = load.acceleration if load.type == "gravity" else (load.group, load.total)
-        facts.append(("load", f"{load.type} {what}"))
+        facts.append(("load", f"{load.type} {load.describe()}"))
     show_facts(facts)
 
 
 def _analysis(case: Case) -> str:
-    from ancf_petsc.plan.plan import output_times
+    from ancf_petsc.plan.outputs import output_times
 
     if case.spec.statics:
         return f"statics, {len(output_times(case.spec, case.file))} outputs after the start"

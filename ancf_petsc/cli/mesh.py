@@ -51,7 +51,7 @@ def execute(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.name is None:
         raise CaseError(
-            "which mesh?", key="NAME", expected=f"one of {', '.join(BODIES)}", cure="ancf mesh --list"
+            "missing", key="NAME", expected=f"one of {', '.join(BODIES)}", cure="ancf mesh --list"
         )
     path = make_mesh(
         arguments.name,

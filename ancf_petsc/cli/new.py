@@ -9,7 +9,6 @@ from shlex import quote
 from typing import NamedTuple
 
 HELP = "write a commented case and its mesh to start from"
-CASE_FILE = "case.toml"
 DEFAULT_KIND = "compression"
 
 HEAD = """\
@@ -140,7 +139,7 @@ group = "tip"
 """
 
 
-class Kind(NamedTuple):
+class Template(NamedTuple):
     """A sort of case: what it shows, which of the project's meshes it takes, its tables."""
 
     about: str
@@ -150,9 +149,9 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "compression": Kind("a quarter block, compressed", "cube", (4, 4, 8), COMPRESSION),
-    "bending": Kind("a cantilever under a force and its own weight", "cantilever", (20, 2, 2), BENDING),
-    "dynamics": Kind("a falling pendulum", "pendulum", (4, 2, 2), DYNAMICS),
+    "compression": Template("a quarter block, compressed", "cube", (4, 4, 8), COMPRESSION),
+    "bending": Template("a cantilever under a force and its own weight", "cantilever", (20, 2, 2), BENDING),
+    "dynamics": Template("a falling pendulum", "pendulum", (4, 2, 2), DYNAMICS),
 }
 EPILOG = "kinds:\n" + "\n".join(f"  {name:<13}{kind.about}" for name, kind in KINDS.items())
 
@@ -166,14 +165,15 @@ def execute(arguments: argparse.Namespace) -> int:
     from ancf_petsc.cli import rank
 
     if rank() == 0:
-        write_case(arguments.name, arguments.kind)
-        print(f"wrote {arguments.name / CASE_FILE} and its mesh; next: ancf run {arguments.name}")
+        file = write_case(arguments.name, arguments.kind)
+        print(f"wrote {file} and its mesh; next: ancf run {arguments.name}")
     return 0
 
 
 def write_case(folder: Path, kind: str = DEFAULT_KIND) -> Path:
     """Make `folder` with case.toml and a mesh; the case file. Raises CaseError where there is something."""
     from ancf_petsc.errors import CaseError, did_you_mean
+    from ancf_petsc.input.load import CASE_FILE
     from ancf_petsc.mesh.generate import make_mesh
 
     if kind not in KINDS:
@@ -188,10 +188,9 @@ def write_case(folder: Path, kind: str = DEFAULT_KIND) -> Path:
         folder.mkdir(parents=True)
     except OSError as error:
         raise CaseError(
-            f"cannot be made: {error.strerror}",
+            f"cannot create the folder: {error.strerror}",
             file=folder,
-            expected="a folder one may write to",
-            cure="go elsewhere",
+            cure="choose a folder you can write to",
         ) from None
     chosen = KINDS[kind]
     mesh = f"{chosen.mesh}.msh"

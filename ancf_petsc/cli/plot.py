@@ -85,12 +85,12 @@ def execute(arguments: argparse.Namespace) -> int:
 def _figures(arguments: argparse.Namespace, runs: list[Results]) -> dict[str, Figure]:
     """All that the runs have columns for, or the components that were named."""
     from ancf_petsc.post.figures import components, figures_of
-    from ancf_petsc.post.reference import Reference, read_level, read_reference
+    from ancf_petsc.post.reference import ReferenceCurve, read_level, read_reference
 
     if arguments.level and not arguments.probe:
-        raise CaseError("of what?", key="--level", cure="name a component with --probe, as in --probe tip.z")
+        raise CaseError("needs a probe component", key="--level", cure="such as --probe tip.z")
     levels = [read_level(text) for text in arguments.level]
-    drawn: list[Results | Reference] = [
+    drawn: list[Results | ReferenceCurve] = [
         *runs,
         *(read_reference(path, runs[0]) for path in arguments.reference),
     ]

@@ -11,7 +11,7 @@ from ancf_petsc.errors import CaseError
 
 if TYPE_CHECKING:
     from ancf_petsc.mesh.mesh import Mesh
-    from ancf_petsc.post.case_view import Support
+    from ancf_petsc.post.case_view import Marked
     from ancf_petsc.results.reader import Results
 
 HELP = "look at a run, or at a case before it runs"
@@ -71,7 +71,7 @@ def _show_run(arguments: argparse.Namespace) -> None:
 
     results = open_results(arguments.case)
     if arguments.changes:
-        raise CaseError("a run has been solved: nothing of it changes", file=arguments.case, key="--set")
+        raise CaseError("applies to cases; this is a finished run", file=arguments.case, key="--set")
     look = view.Look(arguments.field, arguments.component, arguments.scale, arguments.undeformed)
     step = _step(results, arguments)
     if arguments.screenshot:
@@ -96,7 +96,7 @@ def _show_case(arguments: argparse.Namespace) -> None:
     from ancf_petsc.post import case_view
 
     if arguments.movie:
-        raise CaseError("nothing moves before a case is solved", file=arguments.case, key="--movie")
+        raise CaseError("needs a finished run; this is a case", file=arguments.case, key="--movie")
     case = load_case(arguments.case, changes(arguments))
     row = element(case.spec.mesh.element)
     mesh = read_mesh(case.mesh_file, row.kinds, duplicates=case.spec.mesh.duplicates, element=row.code)
@@ -110,13 +110,13 @@ def _show_case(arguments: argparse.Namespace) -> None:
         case_view.explore(*shown)
 
 
-def _supports(case, mesh: Mesh) -> list[Support]:
+def _supports(case, mesh: Mesh) -> list[Marked]:
     """What the case holds, moves and pushes. Raises CaseError for a group that is not in the mesh."""
     from ancf_petsc.mesh.groups import find_group
-    from ancf_petsc.post.case_view import Support
+    from ancf_petsc.post.case_view import Marked
 
-    supports = [Support(one.group, one.fix, dict(one.move)) for one in case.spec.constraint]
-    supports += [Support(one.group, force=one.total) for one in case.spec.load if one.type == "force"]
+    supports = [Marked(one.group, one.fix, dict(one.move)) for one in case.spec.constraint]
+    supports += [Marked(one.group, force=one.total) for one in case.spec.load if one.type == "force"]
     for support in supports:
         find_group(mesh, support.group, "group", case.file)
     return supports

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, create_model, model_validator
 
-from ancf_petsc.input.methods import METHODS
+from ancf_petsc.input.methods import METHODS, Method
 from ancf_petsc.input.types import Table, Vector, key, one_of, problem
 
 
@@ -57,18 +57,27 @@ class CriticalMode(Table):
     critical: int = key("a whole number >= 1", ge=1)
 
 
-class DynamicsSpec(Table):
+def _own_keys() -> dict[str, Any]:
+    """The keys that are one integrator's own: whole numbers where the default is one."""
+    options = [row.option for row in METHODS.values() if row.option]
+    return {
+        row.name: (type(row.default), key(row.expected, row.default, ge=row.least, le=row.most))
+        for row in options
+    }
+
+
+OwnKeys = create_model("OwnKeys", __base__=Table, **_own_keys())
+
+
+class DynamicsSpec(OwnKeys):  # type: ignore[misc, valid-type]
     """[dynamics]: motion over `duration`. A step, or a tolerance where the integrator adapts its step."""
 
     duration: float = key("a number > 0; in the unit of time", gt=0)
-    integrator: Annotated[str, one_of(METHODS, "an integrator")] = key(
+    integrator: Annotated[str, one_of(lambda: METHODS, "an integrator")] = key(
         'an integrator; such as "generalized_alpha"', "generalized_alpha"
     )
     step: float | None = key("a number > 0; in the unit of time", None, gt=0)
     tolerance: float | None = key("a number in (0, 1); relative, such as 1e-7", None, gt=0, lt=1)
-    spectral_radius: float = key("a number in [0, 1]; such as 0.8", 0.8, ge=0, le=1)
-    theta: float = key("a number in [0.5, 1]; 0.5 is the trapezoidal rule", 0.5, ge=0.5, le=1)
-    order: int = key("1 or 2; orders above 2 are unstable for undamped structures", 2, ge=1, le=2)
     mass: Literal["consistent", "lumped"] = key("a kind of mass matrix", "consistent")
     damping: Annotated[float, Field(ge=0)] | Literal["critical"] | CriticalMode = key(
         'a number >= 0, "critical" or { critical = n }; in 1 / unit of time', 0.0
@@ -78,8 +87,20 @@ class DynamicsSpec(Table):
     @model_validator(mode="before")
     @classmethod
     def _default_tolerance(cls, data: Any) -> Any:
-        asks = isinstance(data, dict) and data.get("integrator") == "runge_kutta_5dp"
-        return {"tolerance": 1e-7, **data} if asks and not {"step", "tolerance"} & data.keys() else data
+        row = METHODS.get(str(data.get("integrator"))) if isinstance(data, dict) else None
+        if row is None or row.tolerance is None or {"step", "tolerance"} & data.keys():
+            return data
+        return {"tolerance": row.tolerance, **data}
+
+    @property
+    def method(self) -> Method:
+        """The integrator's row."""
+        return METHODS[self.integrator]
+
+    @property
+    def option(self) -> float:
+        """The value of the integrator's own key, 0 where it has none."""
+        return getattr(self, self.method.option.name) if self.method.option else 0
 
     @model_validator(mode="after")
     def _check(self) -> DynamicsSpec:
@@ -92,7 +113,7 @@ class DynamicsSpec(Table):
                 expected="one of them",
                 cure="drop one",
             )
-        if self.tolerance is not None and not METHODS[name].adaptive:
+        if self.tolerance is not None and not self.method.adaptive:
             adaptive = ", ".join(row.name for row in METHODS.values() if row.adaptive)
             raise problem(
                 at=["tolerance"],
@@ -103,11 +124,11 @@ class DynamicsSpec(Table):
         if self.step is None and self.tolerance is None:
             raise problem("missing", at=["step"], expected=f"a step for {name}", cure="such as step = 1e-3")
         for row in METHODS.values():
-            if row.option in self.model_fields_set and row.name != name:
+            if row.option and row.option.name in self.model_fields_set and row.name != name:
                 raise problem(
                     f"{name} does not read it",
-                    at=[row.option],
-                    got=getattr(self, row.option),
+                    at=[row.option.name],
+                    got=getattr(self, row.option.name),
                     expected=f'integrator = "{row.name}" with it',
                     cure="drop it or change the integrator",
                 )

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-from pydantic_core import PydanticCustomError
+from pydantic import ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from ancf_petsc.element import dncm
 from ancf_petsc.errors import CaseError
+from ancf_petsc.input.schema import CaseSpec, ConstraintSpec, laws
 from ancf_petsc.input.types import Direction, Ramp, problem
 
-if TYPE_CHECKING:
-    from ancf_petsc.input.schema import CaseSpec, ConstraintSpec
-
 Problems = Iterator[PydanticCustomError]
+
+
+def check(spec: CaseSpec) -> None:
+    """Raise ValidationError with the first of the problems, which says how many others there are."""
+    found = problems(spec)
+    if not found:
+        return
+    context = found[0].context or {}
+    first = problem(**{**context, "more": len(found) - 1})
+    raise ValidationError.from_exception_data("case", [InitErrorDetails(type=first, loc=(), input=None)])
 
 
 def problems(spec: CaseSpec) -> list[PydanticCustomError]:
@@ -59,7 +67,7 @@ def _materials(spec: CaseSpec) -> Problems:
 
 
 def _densities(spec: CaseSpec) -> Problems:
-    gravity = any(load.type == "gravity" for load in spec.load)
+    gravity = any(load.needs_mass for load in spec.load)
     if not gravity and not spec.dynamics:
         return
     for index, material in enumerate(spec.material):
@@ -187,25 +195,22 @@ def _section(spec: CaseSpec) -> Problems:
                 expected=f"{' and '.join(needed) or 'no [section]'} for element {code}",
                 cure="drop it",
             )
-    if (
-        "plane" in needed
-        and section
-        and section.plane == "stress"
-        and any(m.law != "svk" for m in spec.material)
-    ):
+    condensing = " or ".join(name for name, law in laws().items() if law.condenses)
+    others = [material.law for material in spec.material if not laws()[material.law].condenses]
+    if "plane" in needed and section and section.plane == "stress" and others:
         yield problem(
             at=["section", "plane"],
             got="stress",
-            expected="plane strain for neo_hooke",
-            cure="take svk or plane strain",
+            expected=f"plane strain for {others[0]}",
+            cure=f"use {condensing} or plane strain",
         )
-    if "area" in needed and any(material.law != "svk" for material in spec.material):
+    if "area" in needed and others:
         yield problem(
             "beams are linearly elastic",
             at=["material", 0, "law"],
-            got=next(material.law for material in spec.material if material.law != "svk"),
-            expected="svk for beams",
-            cure='law = "svk": young is all a beam reads of it',
+            got=others[0],
+            expected=f"{condensing} for beams",
+            cure=f'law = "{condensing}": young is all a beam reads of it',
         )
     for name in needed:
         if name not in given:

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from ancf_petsc.errors import CaseError, did_you_mean
 from ancf_petsc.input import toml
+from ancf_petsc.input.checks import check
 from ancf_petsc.input.messages import case_error
 from ancf_petsc.input.overrides import apply_settings, petsc_table, set_value, split_path
 from ancf_petsc.input.schema import CaseSpec
@@ -85,6 +86,7 @@ def _checked(
         frozen["material"] = (source["material"],)
     try:
         spec = CaseSpec.model_validate(frozen)
+        check(spec)
     except ValidationError as error:
         raise case_error(error, frozen, source, told or file or name) from None
     return Case(spec, file, folder, name, toml.write(data))

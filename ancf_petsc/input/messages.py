@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from json import dumps
 from pathlib import Path
@@ -13,11 +12,12 @@ from typing import Any, Literal, NamedTuple, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from ancf_petsc.axes import AXES
 from ancf_petsc.errors import CaseError, did_you_mean
+from ancf_petsc.input.loads import LOADS
 from ancf_petsc.input.schema import CaseSpec
-from ancf_petsc.input.types import AXES
+from ancf_petsc.input.toml import BARE
 
-BARE = re.compile(r"[A-Za-z0-9_-]+")
 LONGEST = 80
 ABSENT = object()
 FORMAT_PAGE = "docs/case-format.md has examples"
@@ -80,7 +80,7 @@ def _translate(
         what, got, expected, cure = "unknown key", None, f"one of {', '.join(AXES)}", cure
     elif kind.startswith("union_tag"):
         way, got = (*way, "type"), got.get("type", ABSENT)
-        expected, cure = '"gravity" or "force"', _nearest(got, ("gravity", "force"))
+        expected, cure = " or ".join(f'"{name}"' for name in LOADS), _nearest(got, LOADS)
     elif options := _options_of(place.field):
         cure = _nearest(got, options)
     if got is ABSENT:

@@ -10,28 +10,45 @@ from typing import NamedTuple
 HOME = "ancf_petsc.motion.integrators"
 
 
+class Option(NamedTuple):
+    """A key of [dynamics] that one integrator reads. expected, default, least, most: as in input/schema."""
+
+    name: str
+    expected: str
+    default: float
+    least: float
+    most: float
+
+
 class Method(NamedTuple):
     """An integrator. home: module and class in motion/integrators. adaptive: it may choose its steps by a tolerance.
 
-    option: the key of [dynamics] that is its own.
+    option: the key of [dynamics] that is its own. tolerance: what it takes where the case says neither step nor tolerance.
+    conserves: it keeps the energy to the tolerance of Newton, by the laws' kernels between two states.
     """
 
     name: str
     home: str
     adaptive: bool = False
-    option: str = ""
+    option: Option | None = None
+    tolerance: float | None = None
+    conserves: bool = False
 
+
+RADIUS = Option("spectral_radius", "a number in [0, 1]; such as 0.8", 0.8, 0, 1)
+THETA = Option("theta", "a number in [0.5, 1]; 0.5 is the trapezoidal rule", 0.5, 0.5, 1)
+ORDER = Option("order", "1 or 2; orders above 2 are unstable for undamped structures", 2, 1, 2)
 
 METHODS = {
     row.name: row
     for row in (
-        Method("generalized_alpha", "generalized_alpha.GeneralizedAlpha", option="spectral_radius"),
-        Method("energy_momentum", "energy_momentum.EnergyMomentum"),
+        Method("generalized_alpha", "generalized_alpha.GeneralizedAlpha", option=RADIUS),
+        Method("energy_momentum", "energy_momentum.EnergyMomentum", conserves=True),
         Method("central_difference", "central_difference.CentralDifference"),
-        Method("runge_kutta_5dp", "runge_kutta.RungeKutta5dp", adaptive=True),
+        Method("runge_kutta_5dp", "runge_kutta.RungeKutta5dp", adaptive=True, tolerance=1e-7),
         Method("runge_kutta_4", "runge_kutta.RungeKutta4"),
         Method("rosenbrock", "rosenbrock.Rosenbrock", adaptive=True),
-        Method("bdf", "bdf.Bdf", adaptive=True, option="order"),
-        Method("theta", "theta.Theta", option="theta"),
+        Method("bdf", "bdf.Bdf", adaptive=True, option=ORDER),
+        Method("theta", "theta.Theta", option=THETA),
     )
 }

@@ -1,24 +1,25 @@
 """The case file, format 1: every table with its keys, defaults and limits. docs/case-format.md is for users.
 
-Each key carries its expectation in words; input/messages.py makes a user's message of it. Checks across
-tables are in input/checks.py.
+Each key carries its expectation in words; input/messages.py makes a user's message of it. What must hold between tables
+is in input/checks.py.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from ancf_petsc.axes import AXES
 from ancf_petsc.input.analysis import (
     CriticalMode,
     DynamicsSpec,
     InitialSpec,
     StaticsSpec,
 )
-from ancf_petsc.input.checks import problems
+from ancf_petsc.input.loads import ForceSpec, GravitySpec, LoadSpec
 from ancf_petsc.input.types import (
-    AXES,
     Axes,
     Axis,
     Direction,
@@ -33,7 +34,15 @@ from ancf_petsc.input.types import (
     problem,
 )
 
-LAWS = ("svk", "neo_hooke")
+if TYPE_CHECKING:
+    from ancf_petsc.material.models import Law
+
+
+def laws() -> Mapping[str, Law]:
+    """The laws there are; they are imported, and numba with them, when a case is checked."""
+    from ancf_petsc.material.models import LAWS
+
+    return LAWS
 
 
 class MeshSpec(Table):
@@ -86,9 +95,9 @@ class MaterialSpec(Table):
     """[material], or one [[material]]: the one without a group takes what the others leave."""
 
     group: Name | None = key("a group's name in quotes; of the mesh file or of [groups]", None)
-    law: Annotated[str, one_of(LAWS, "a law")] = key('a law; such as law = "svk"')
+    law: Annotated[str, one_of(laws, "a law")] = key('a law; such as law = "svk"')
     young: float = key("a number > 0; Young's modulus in the unit of stress, such as young = 6.8e6", gt=0)
-    poisson: float = key("a number in (-1, 0.5); take 0.49 for what hardly changes its volume", gt=-1, lt=0.5)
+    poisson: float = key("a number in (-1, 0.5); use 0.49 for nearly incompressible material", gt=-1, lt=0.5)
     density: float | None = key("a number > 0; the undeformed mass per volume", None, gt=0)
 
 
@@ -103,9 +112,10 @@ class ConstraintSpec(Table):
 
     @model_validator(mode="after")
     def _check(self) -> ConstraintSpec:
-        if not self.fix and not self.move and not self.slopes:
+        kinds = [name for name in type(self).model_fields if name not in ("group", "ramp")]
+        if not any(getattr(self, name) for name in kinds):
             raise problem(
-                "neither fix nor move nor slopes",
+                f"neither {' nor '.join(kinds)}",
                 expected="one of them at least",
                 cure='such as fix = ["x", "y", "z"]',
             )
@@ -119,26 +129,6 @@ class ConstraintSpec(Table):
                 cure="drop one",
             )
         return self
-
-
-class GravitySpec(Table):
-    """One [[load]] of type gravity, on everything that has mass."""
-
-    type: Literal["gravity"]
-    acceleration: Vector = key("three numbers; such as [0.0, 0.0, -9.81]")
-    ramp: RampKey = key('a ramp; such as "cosine"', "linear")
-
-
-class ForceSpec(Table):
-    """One [[load]] of type force: dead, spread over the group by the shape functions."""
-
-    type: Literal["force"]
-    group: Name = key("a group's name in quotes; of the mesh file or of [groups]")
-    total: Vector = key("three numbers; the whole force on the group, such as [0.0, 0.0, -120.0]")
-    ramp: RampKey = key('a ramp; such as "cosine"', "linear")
-
-
-LoadSpec = Annotated[GravitySpec | ForceSpec, Field(discriminator="type")]
 
 
 class CurveSpec(Table):
@@ -208,23 +198,8 @@ class CaseSpec(Table):
         }
         return {**data, **filled}
 
-    @model_validator(mode="after")
-    def _check(self) -> CaseSpec:
-        if found := problems(self):
-            first = found[0].context or {}
-            raise problem(
-                first["what"],
-                at=first["at"],
-                got=first["got"],
-                expected=first["expected"],
-                cure=first["cure"],
-                more=len(found) - 1,
-            )
-        return self
-
 
 __all__ = [
-    "LAWS",
     "CaseSpec",
     "ConstraintSpec",
     "CriticalMode",

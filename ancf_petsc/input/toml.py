@@ -27,7 +27,7 @@ def parse(text: str, file: str | Path | None = None) -> dict[str, Any]:
         number = int(found["line"]) if found and found["line"] else 0
         line = text.splitlines()[number - 1].strip() if 0 < number <= len(text.splitlines()) else None
         raise CaseError(
-            f"no valid TOML: {what[:1].lower()}{what[1:]}",
+            f"not valid TOML: {what[:1].lower()}{what[1:]}",
             file=file,
             key=where,
             got=line,
@@ -36,7 +36,7 @@ def parse(text: str, file: str | Path | None = None) -> dict[str, Any]:
         ) from None
     except (RecursionError, ValueError) as error:
         raise CaseError(
-            f"no valid TOML: {error}", file=file, expected="a case file", cure="see docs/case-format.md"
+            f"not valid TOML: {error}", file=file, expected="a case file", cure="see docs/case-format.md"
         ) from None
 
 
@@ -46,7 +46,7 @@ def read(file: Path) -> dict[str, Any]:
         return parse(file.read_text(encoding="utf-8-sig"), file)
     except UnicodeDecodeError as error:
         raise CaseError(
-            f"no text: byte {error.start} is not UTF-8",
+            f"not a text file: byte {error.start} is not UTF-8",
             file=file,
             expected="a TOML file",
             cure="save it as UTF-8",

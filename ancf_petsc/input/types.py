@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator
 from pydantic_core import PydanticCustomError
 
+from ancf_petsc.axes import AXES
 from ancf_petsc.errors import did_you_mean
 
-AXES = ("x", "y", "z")
 RAMPS = ("linear", "cosine", "constant")
 
 Axis = Literal["x", "y", "z"]
@@ -55,12 +55,13 @@ def problem(
     return PydanticCustomError("problem", "{what}", context)
 
 
-def one_of(known: Collection[str], what: str) -> AfterValidator:
-    """A string out of `known`, as it is when a case is read."""
+def one_of(known: Callable[[], Collection[str]], what: str) -> AfterValidator:
+    """A string out of what `known` gives when a case is read."""
 
     def check(word: str) -> str:
-        if word not in known:
-            raise problem(got=word, expected=what, cure=did_you_mean(word, tuple(known)))
+        names = known()
+        if word not in names:
+            raise problem(got=word, expected=what, cure=did_you_mean(word, tuple(names)))
         return word
 
     return AfterValidator(check)

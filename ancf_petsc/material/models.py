@@ -23,7 +23,7 @@ the misprint of (9) mended (docs/theory.md).
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import log, log1p
+from math import log, log1p, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -51,7 +51,11 @@ SAME_STRAIN = 1e-6  # below it a correction of second order in the difference of
 
 
 class Law(NamedTuple):
-    """A hyperelastic law: see the head of this module."""
+    """A hyperelastic law: see the head of this module.
+
+    condenses: `plane_stress` and beams take its parameters. softest: in uniaxial strain the stress is smallest at this stretch and
+    grows again below, so that a body carries no more force there; None where there is no such stretch.
+    """
 
     name: str
     title: str
@@ -61,6 +65,8 @@ class Law(NamedTuple):
     parameters: Callable[[float, float], NDArray[np.float64]]
     mean_stress: Callable | None = None
     mean_tangent: Callable | None = None
+    condenses: bool = False
+    softest: float | None = None
 
 
 def lame_parameters(young: float, poisson: float) -> NDArray[np.float64]:
@@ -248,6 +254,8 @@ LAWS = {
             lame_parameters,
             svk_mean_stress,
             svk_mean_tangent,
+            condenses=True,
+            softest=sqrt(1.0 / 3.0),
         ),
         Law(
             "neo_hooke",

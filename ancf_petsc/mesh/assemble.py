@@ -28,7 +28,7 @@ ASK_FOR = {
 }
 
 
-class Numbering:
+class NodeNumbers:
     """Where the nodes of a file stand in the points of the mesh."""
 
     def __init__(self, numbers: Integers, path: Path) -> None:
@@ -62,7 +62,7 @@ def assemble(raw: RawMesh, path: Path, kinds: tuple[str, ...], duplicates: str, 
     numbers, points = _sorted_nodes(raw, path)
     bodies, others = _body_blocks(raw.blocks, kinds, element, path)
     kind = KINDS[bodies[0].kind]
-    numbering = Numbering(numbers, path)
+    numbering = NodeNumbers(numbers, path)
     cell_numbers, cells, membership = _cells(bodies, numbering)
     used = np.zeros(len(points), dtype=bool)
     used[cells] = True
@@ -139,7 +139,7 @@ def _wrong_cells(
     return wrong(f"found {found}, expected {expected}", cure=cure)
 
 
-def _cells(blocks: list[Block], numbering: Numbering) -> tuple[Integers, Integers, dict[str, Integers]]:
+def _cells(blocks: list[Block], numbering: NodeNumbers) -> tuple[Integers, Integers, dict[str, Integers]]:
     """Numbers (e,) ascending, cells (e, k), group name -> its cells; a cell listed twice is one cell."""
     numbers = np.concatenate([block.numbers for block in blocks])
     nodes = np.concatenate([numbering.of(block) for block in blocks])
@@ -161,7 +161,7 @@ def _cells(blocks: list[Block], numbering: Numbering) -> tuple[Integers, Integer
     return numbers[order][kept], nodes[order][kept], membership
 
 
-def _settle_duplicates(mesh: Mesh, numbering: Numbering, duplicates: str) -> None:
+def _settle_duplicates(mesh: Mesh, numbering: NodeNumbers, duplicates: str) -> None:
     """Coincident nodes in use: refuse, keep or merge them."""
     nodes = np.flatnonzero(mesh.used)
     pairs = nodes[coincident_pairs(mesh.points[nodes], TOLERANCE * mesh.size)]
@@ -170,7 +170,7 @@ def _settle_duplicates(mesh: Mesh, numbering: Numbering, duplicates: str) -> Non
     pairs = pairs[np.lexsort(pairs.T[::-1])]
     doubled = len(np.unique(pairs[:, 1]))
     if duplicates == "keep":
-        mesh.notes.append(f"{doubled} nodes lie on others: kept apart")
+        mesh.notes.append(f'{doubled} coincident nodes kept separate (mesh.duplicates = "keep")')
     elif duplicates == "merge":
         _merge(mesh, numbering, pairs)
         mesh.notes.append(f"{doubled} nodes lay on others: merged")
@@ -178,12 +178,12 @@ def _settle_duplicates(mesh: Mesh, numbering: Numbering, duplicates: str) -> Non
         first, second = pairs[0]
         one, other = mesh.node_numbers[first], mesh.node_numbers[second]
         raise mesh_error(numbering.path)(
-            f"{doubled} nodes lie on others, first nodes {one} and {other} at {_place(mesh.points[first])}",
+            f"{doubled} nodes coincide with others, first nodes {one} and {other} at {_place(mesh.points[first])}",
             cure='set mesh.duplicates = "merge" to join them or "keep" for a crack or separate bodies',
         )
 
 
-def _merge(mesh: Mesh, numbering: Numbering, pairs: Integers) -> None:
+def _merge(mesh: Mesh, numbering: NodeNumbers, pairs: Integers) -> None:
     """Nodes that coincide become the one with the lowest number, which keeps it."""
     wrong = mesh_error(numbering.path)
     target = representatives(pairs, len(mesh.points))
@@ -233,7 +233,7 @@ def _orient(mesh: Mesh, kind: Kind, path: Path) -> None:
 
 
 def _build_groups(
-    mesh: Mesh, raw: RawMesh, blocks: list[Block], membership: dict[str, Integers], numbering: Numbering
+    mesh: Mesh, raw: RawMesh, blocks: list[Block], membership: dict[str, Integers], numbering: NodeNumbers
 ) -> None:
     """Groups of the parts and cells that have the name; parts with nodes no cell uses are left out."""
     kind = KINDS[mesh.kind]

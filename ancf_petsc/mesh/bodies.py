@@ -21,7 +21,7 @@ Edges = dict[str, tuple[tuple[Plane, Plane], ...]]
 
 
 @dataclass(frozen=True)
-class Body:
+class Primitive:
     """One of the project's bodies.
 
     faces: group name -> planes its faces lie on, as (axis, coordinate).
@@ -62,10 +62,10 @@ def box(
     size: float,
     divisions: tuple[int, int, int],
     rims: tuple[Plane, ...] = (),
-) -> Body:
+) -> Primitive:
     """A box from its lowest to its highest corner."""
     build, grid = partial(_add_box, low=low, high=high), partial(_box_grid, low=low, high=high)
-    return Body(about, build, grid, faces, edges or {}, size, divisions, rims)
+    return Primitive(about, build, grid, faces, edges or {}, size, divisions, rims)
 
 
 INNER, OUTER, HEIGHT = 0.025, 0.095, 0.1
@@ -115,7 +115,7 @@ QUARTER: Faces = {
 BONDED: tuple[Plane, ...] = (("z", 0.0), ("z", 0.1))
 
 BODIES = {
-    "pvc_block": Body(
+    "pvc_block": Primitive(
         "quarter of a grooved ring 190 x 100 mm, bore 50, groove 25 deep and 20 wide (assumed geometry)",
         _add_pvc_block,
         _pvc_grid,

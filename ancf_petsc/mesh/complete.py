@@ -64,7 +64,7 @@ def _add_nodes(mesh: Mesh, cells: Integers, places: Integers) -> None:
     mesh.groups = groups
     what = {2: "middles of edges"}.get(places.shape[1], "centres of faces")
     mesh.notes.append(
-        f"{len(corners)} nodes added at {what}, numbered from {highest + 1}: the element has them, the mesh file not"
+        f"{len(corners)} nodes added at {what}, numbered from {highest + 1}: the mesh file lacks them and the element needs them"
     )
 
 

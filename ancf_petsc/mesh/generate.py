@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ancf_petsc.errors import CaseError, did_you_mean
-from ancf_petsc.mesh.bodies import BODIES, Body, Plane
+from ancf_petsc.mesh.bodies import BODIES, Plane, Primitive
 from ancf_petsc.mesh.gmsh_session import gmsh_session
 from ancf_petsc.mesh.kinds import KINDS, KUHN, part_kind
 from ancf_petsc.mesh.mesh import Floats, Integers
@@ -85,7 +85,7 @@ def _checked_request(
     order: int,
     hexahedra: bool,
     version: str,
-) -> Body:
+) -> Primitive:
     if name not in BODIES:
         raise CaseError("no such body", key="NAME", got=name, cure=did_you_mean(name, list(BODIES)))
     if size is not None and (divisions is not None or hexahedra):
@@ -118,7 +118,7 @@ def _check_rim(name: str, rim: float, size: float | None, *, structured: bool) -
         )
 
 
-def _unstructured(body: Body, size: float, rim: float | None) -> tuple[Floats, Integers]:
+def _unstructured(body: Primitive, size: float, rim: float | None) -> tuple[Floats, Integers]:
     """Points (n, 3) and tetrahedra (e, 4) by Gmsh, in its numbering."""
     options = {"Mesh.MeshSizeMin": rim or size, "Mesh.MeshSizeMax": size}
     with gmsh_session(**options) as gmsh:
@@ -160,7 +160,7 @@ def grade(gmsh: Any, curves: Sequence[int], size: float, rim: float) -> None:
         gmsh.option.setNumber(f"Mesh.MeshSize{source}", 0)
 
 
-def _rim_curves(gmsh: Any, body: Body) -> list[int]:
+def _rim_curves(gmsh: Any, body: Primitive) -> list[int]:
     """Curves of the model on planes of rims and on none of symmetry."""
     symmetry = [planes for name, planes in body.faces.items() if name.startswith("symmetry")]
     found = []
@@ -181,7 +181,9 @@ def bricks(grid: Floats) -> tuple[Floats, Integers]:
     return grid.reshape(-1, 3), np.stack([corner.ravel() for corner in lower + upper], axis=1)
 
 
-def _flat(body: Body, divisions: Sequence[int], kind: str) -> tuple[Floats, list[tuple[str, int, Integers]]]:
+def _flat(
+    body: Primitive, divisions: Sequence[int], kind: str
+) -> tuple[Floats, list[tuple[str, int, Integers]]]:
     """Points and groups of the section half way along y (quadrilaterals in z-x) or of the axis along x (lines)."""
     d = KINDS[kind].dimension
     nx, _, nz = divisions
@@ -204,7 +206,9 @@ def _flat(body: Body, divisions: Sequence[int], kind: str) -> tuple[Floats, list
     return points, [*groups, ("solid", d, cells)]
 
 
-def _group_parts(body: Body, points: Floats, cells: Integers, kind: str) -> list[tuple[str, int, Integers]]:
+def _group_parts(
+    body: Primitive, points: Floats, cells: Integers, kind: str
+) -> list[tuple[str, int, Integers]]:
     """Name, dimension, parts (m, corners) of the body's groups."""
     sides = outer_sides(kind, cells, len(points))
     edges = np.stack([sides, np.roll(sides, -1, axis=1)], axis=-1).reshape(-1, 2)

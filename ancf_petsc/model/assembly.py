@@ -28,8 +28,8 @@ class Assembly:
         self._positions = model.reference.copy()
         self._second = model.reference.copy()
         self._force = np.zeros_like(model.reference)
-        self.driven = np.flatnonzero(model.motion[:n] >= 0)
-        self.driven_motion = model.motion[:n].ravel()[self.driven]
+        self.driven = np.flatnonzero(model.drive[:n] >= 0)
+        self.driven_by = model.drive[:n].ravel()[self.driven]
         self._ghosts = self._ghost_scatter()
 
     # --- vectors
@@ -64,9 +64,9 @@ class Assembly:
 
     def set_driven(self, x: PETSc.Vec, s: float) -> None:
         """Put the driven degrees of freedom of x where they belong at pseudo-time s."""
-        values = np.array([motion.value(s) for motion in self.model.motions] or [0.0])
+        values = np.array([drive.value(s) for drive in self.model.drives] or [0.0])
         owned = self.model.reference[: self.model.owned].ravel()
-        x.array[self.driven] = owned[self.driven] + values[self.driven_motion]
+        x.array[self.driven] = owned[self.driven] + values[self.driven_by]
 
     def external_force(self, s: float) -> NDArray:
         """Dead loads on the owned nodal vectors (n, 3) at pseudo-time s."""

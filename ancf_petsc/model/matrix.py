@@ -58,7 +58,7 @@ class Layout:
         self.strides[:n, 0] = 3 * np.diff(self.rows.own_pointers)
         self.strides[:n, 1] = 3 * np.diff(self.rows.other_pointers)
         self.driven_bits = model.driven_bits()
-        self.driven = np.flatnonzero(model.motion[:n] >= 0)
+        self.driven = np.flatnonzero(model.drive[:n] >= 0)
         self.diagonal = self._diagonal()
 
     def _diagonal(self) -> Integers:

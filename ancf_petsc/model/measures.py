@@ -2,27 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import combined
-
-AXES = ("x", "y", "z")
-
-
-@dataclass(frozen=True)
-class CurveChoice:
-    """Which group and component the columns `force` and `stroke` follow; area: undeformed, None for no surface."""
-
-    force_group: str
-    force_axis: int
-    stroke_group: str
-    stroke_axis: int
-    area: float | None
 
 
 def reaction(assembly: Assembly, out_of_balance: NDArray, group: str) -> NDArray[np.float64]:
@@ -56,14 +41,14 @@ def mean_stress(assembly: Assembly, cauchy: NDArray, group: str, axis: int) -> f
 
 
 def conjugates(assembly: Assembly, x: PETSc.Vec, out_of_balance: NDArray) -> tuple[NDArray, NDArray]:
-    """What the work hangs on: the reaction of each motion (m,) and the displacement each load sees (l,)."""
+    """What the work hangs on: the reaction of each drive (m,) and the displacement each load sees (l,)."""
     model = assembly.model
     values = out_of_balance.ravel()[assembly.driven]
-    reactions = np.bincount(assembly.driven_motion, values, minlength=len(model.motions))
+    reactions = np.bincount(assembly.driven_by, values, minlength=len(model.drives))
     displacement = x.array_r.reshape(-1, 3) - model.reference[: model.owned]
     seen = np.array([float((load.pattern * displacement).sum()) for load in model.loads])
     both = combined(assembly.comm, np.concatenate((reactions, seen)))
-    return both[: len(model.motions)], both[len(model.motions) :]
+    return both[: len(model.drives)], both[len(model.drives) :]
 
 
 def von_mises(cauchy: NDArray) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ancf_petsc.model.constraint import Motion
+from ancf_petsc.model.drive import Drive
 from ancf_petsc.model.load import Load
 from ancf_petsc.model.work import PathWork
 
@@ -36,13 +36,13 @@ class Powers:
 class MotionWork:
     """external, dissipated: sums since the start."""
 
-    def __init__(self, motions: Sequence[Motion], loads: Sequence[Load], duration: float) -> None:
+    def __init__(self, drives: Sequence[Drive], loads: Sequence[Load], duration: float) -> None:
         self.loads, self.duration = loads, duration
         self.dissipated = 0.0
         self._of_loads = 0.0
         self._of_impulses = 0.0
-        self._driven = PathWork(motions, [])
-        self._drives = any(motion.amplitude for motion in motions)
+        self._driven = PathWork(drives, [])
+        self._drives = any(drive.amplitude for drive in drives)
         self._time, self._powers = 0.0, Powers(0.0, 0.0, np.zeros(0), np.zeros(0), np.zeros(0))
 
     @property

@@ -1,6 +1,6 @@
 """Work of driven degrees of freedom and of dead loads along the path.
 
-All of it hangs on a few scalars: each motion has the sum of reactions on its degrees of freedom, each load the
+All of it hangs on a few scalars: each drive has the sum of reactions on its degrees of freedom, each load the
 displacement its pattern sees. W = sum_m ∫ R_m dq_m + sum_l ∫ p_l dD_l, where R_m over q_m and D_l over p_l follow
 polynomials through the last accepted states: over the displacement a force is smoother than over the pseudo-time.
 """
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ancf_petsc.model.constraint import Motion
+from ancf_petsc.model.drive import Drive
 from ancf_petsc.model.load import Load
 from ancf_petsc.model.ramp import Ramp
 
@@ -21,10 +21,10 @@ ABSCISSAE, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 class PathWork:
-    """Adds up external work. `reactions` (m,) and `displacements` (l,) belong to motions and loads."""
+    """Adds up external work. `reactions` (m,) and `displacements` (l,) belong to drives and loads."""
 
-    def __init__(self, motions: Sequence[Motion], loads: Sequence[Load]) -> None:
-        self.motions = motions
+    def __init__(self, drives: Sequence[Drive], loads: Sequence[Load]) -> None:
+        self.drives = drives
         self.loads = loads
         self.total = 0.0
         self._before = 0.0
@@ -53,9 +53,9 @@ class PathWork:
         """Work between states k - 1 and k."""
         times = [state[0] for state in self._states]
         work = 0.0
-        for m, motion in enumerate(self.motions):
+        for m, drive in enumerate(self.drives):
             reactions = [state[1][m] for state in self._states]
-            work += motion.amplitude * _integral(motion.ramp, times, reactions, k)
+            work += drive.amplitude * _integral(drive.ramp, times, reactions, k)
         for number, load in enumerate(self.loads):
             seen = [state[2][number] for state in self._states]
             ends = [load.ramp.value(times[j]) * seen[j] for j in (k - 1, k)]

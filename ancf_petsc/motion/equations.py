@@ -6,15 +6,12 @@ jumps, and with the consistent mass the free nodes beside them get their share o
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.mass import Mass
-from ancf_petsc.motion.fused import FusedMotion
 from ancf_petsc.motion.mass_solver import MassSolver
 from ancf_petsc.parallel.exchange import combined
 
@@ -30,21 +27,14 @@ class Equations:
         self.duration = duration
         self.solver = MassSolver(mass)
         model = assembly.model
-        self.moving = any(motion.amplitude for motion in model.motions)
+        self.is_driven = any(drive.amplitude for drive in model.drives)
         self.corners = sorted(
-            {s * duration for motion in model.motions if motion.amplitude for s in motion.ramp.corners()}
+            {s * duration for drive in model.drives if drive.amplitude for s in drive.ramp.corners()}
             | {s * duration for load in model.loads for s in load.ramp.corners()}
         )
         self._piece_end = self._end_of_piece(0.0)
         self._steady = all(load.ramp.kind == "constant" for load in model.loads)
         self._loads = assembly.external_force(0.0)
-
-    @cached_property
-    def fused(self) -> FusedMotion | None:
-        """The motion in compiled loops, where the body is simple enough."""
-        if not FusedMotion.fits(self.mass, self.solver, moving=self.moving):
-            return None
-        return FusedMotion(self.mass, self.solver, self.damping, self.duration)
 
     # --- what is prescribed
 
@@ -54,26 +44,24 @@ class Equations:
 
     def driven_positions(self, t: float) -> NDArray[np.float64]:
         """Of the driven degrees of freedom (c,), in the order of `assembly.driven`."""
-        values = [motion.value(t / self.duration) for motion in self.assembly.model.motions]
+        values = [drive.value(t / self.duration) for drive in self.assembly.model.drives]
         reference = self.assembly.model.reference.ravel()[self.assembly.driven]
-        return reference + np.array(values or [0.0])[self.assembly.driven_motion]
+        return reference + np.array(values or [0.0])[self.assembly.driven_by]
 
     def driven_velocities(self, t: float) -> NDArray[np.float64]:
         """Of the driven degrees of freedom (c,); at the end of a smooth piece those it ends with."""
         s = min(t / self.duration, self._piece_end)
-        rates = [
-            motion.amplitude * motion.ramp.rate(s) / self.duration for motion in self.assembly.model.motions
-        ]
-        return np.array(rates or [0.0])[self.assembly.driven_motion]
+        rates = [drive.amplitude * drive.ramp.rate(s) / self.duration for drive in self.assembly.model.drives]
+        return np.array(rates or [0.0])[self.assembly.driven_by]
 
     def driven_accelerations(self, t: float) -> NDArray[np.float64]:
         """Of the driven degrees of freedom (c,)."""
         s = min(t / self.duration, self._piece_end)
         rates = [
-            motion.amplitude * motion.ramp.curvature(s) / self.duration**2
-            for motion in self.assembly.model.motions
+            drive.amplitude * drive.ramp.curvature(s) / self.duration**2
+            for drive in self.assembly.model.drives
         ]
-        return np.array(rates or [0.0])[self.assembly.driven_motion]
+        return np.array(rates or [0.0])[self.assembly.driven_by]
 
     def place(self, x: PETSc.Vec, v: PETSc.Vec, t: float) -> None:
         """Put the driven degrees of freedom of a state where they belong."""
@@ -86,7 +74,7 @@ class Equations:
         """Enter the smooth piece after t. Velocities of driven nodes may jump: v then holds those after the
         impulse.
         """
-        if not self.moving:
+        if not self.is_driven:
             self._piece_end = self._end_of_piece(t)
             return
         driven = self.assembly.driven
@@ -110,7 +98,7 @@ class Equations:
         """q'' (n, 3) of a state whose driven degrees of freedom are in place; v (n, 3). Collective."""
         force = self.loads(t) - self.assembly.internal_force(x)[0]
         driven = self.assembly.driven
-        if not self.moving:
+        if not self.is_driven:
             result = self.solver.solve(force)
             if self.damping:
                 result -= self.damping * v

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from ancf_petsc.kernel.choice import way_of
 from ancf_petsc.kernel.implicit import Progress, Scheme, Test
-from ancf_petsc.model.mass import Mass
-from ancf_petsc.motion.mass_solver import MassSolver
+from ancf_petsc.motion.equations import Equations
 
 CELLS_AT_ONCE = 10**7
 """Cells times evaluations of forces of one leap: about half a second between two looks at Ctrl-C."""
@@ -29,23 +28,32 @@ class Leap(NamedTuple):
     speed: float
 
 
+def fused_motion(equations: Equations) -> FusedMotion | None:
+    """For one rank, one material, an element with such kernels, nothing driven along, a mass that is factored; else None."""
+    model = equations.assembly.model
+    simple = equations.comm.size == 1 and len(model.regions) == 1 and not equations.is_driven
+    fits = simple and way_of(model.element).motion is not None and equations.solver.is_factored
+    return FusedMotion(equations) if fits else None
+
+
 class FusedMotion:
-    """Rates of change and steps of a body that `fits`. duration: of the motion, for the ramps of its loads.
+    """Rates of change and steps of a body that `fused_motion` took.
 
     steady: whether the loads stay as they are. at_once: evaluations of forces of one leap.
     """
 
-    def __init__(self, mass: Mass, solver: MassSolver, damping: float, duration: float) -> None:
-        assembly, model = mass.assembly, mass.assembly.model
+    def __init__(self, equations: Equations) -> None:
+        assembly, mass, model = equations.assembly, equations.mass, equations.assembly.model
         kernels = way_of(model.element).motion
         assert kernels is not None
         region, (cells, gradients, volumes) = model.regions[0], model.tables
         self._kernels = kernels(region.law)
-        self._damping, self._duration, self._loads = damping, duration, model.loads
+        self._damping, self._duration = equations.damping, equations.duration
+        self._loads = model.loads
         self._body = (cells, gradients, volumes, region.parameters)
         n = model.owned
         self._patterns = np.array([load.pattern for load in model.loads]).reshape(-1, n, 3)
-        self._mass = tuple(solver.factors())
+        self._mass = tuple(equations.solver.factors())
         self._graph = (*assembly.graph, mass.values)
         self._shape = (2, n, 3)
         self._buffers = (np.empty((n, 3)), np.empty((3, n)))
@@ -54,13 +62,6 @@ class FusedMotion:
         self.steady = all(load.ramp.kind == "constant" for load in model.loads)
         self._now = self._factors(np.zeros(1))[0]
         self.at_once = max(1, CELLS_AT_ONCE // max(1, len(cells)))
-
-    @staticmethod
-    def fits(mass: Mass, solver: MassSolver, *, moving: bool) -> bool:
-        """One rank, one material, an element with such kernels, nothing driven along, a mass that is factored."""
-        model = mass.assembly.model
-        simple = mass.comm.size == 1 and len(model.regions) == 1 and not moving
-        return simple and way_of(model.element).motion is not None and solver.is_factored
 
     def rates(self, t: float, y: NDArray, f: NDArray) -> None:
         """f = dy/dt of y = (x, v), flat, at time t."""

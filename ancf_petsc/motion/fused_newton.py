@@ -9,7 +9,7 @@ from ancf_petsc.algebra.envelope import envelope, factorise
 from ancf_petsc.kernel.implicit import DONE, WANTS_FACTOR, Progress, Scheme, Test
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.fused import FusedMotion
-from ancf_petsc.motion.integrators.increment import MOST_ITERATIONS, ROUNDING, SLOW, IncrementSolver
+from ancf_petsc.motion.increment import MOST_ITERATIONS, ROUNDING, SLOW, IncrementSolver
 from ancf_petsc.solve.petsc import begins_a_given_option
 
 MOST_ENTRIES = 200_000
@@ -31,9 +31,9 @@ class FusedNewton:
         self._free = equations.solver.free.ravel().copy()
 
     @staticmethod
-    def fits(equations: Equations, solver: IncrementSolver) -> bool:
-        """A body in compiled loops, small, and no option that speaks of PETSc's solvers."""
-        if equations.fused is None or begins_a_given_option("ts_", "snes_", "ksp_", "pc_", "mat_"):
+    def fits(solver: IncrementSolver) -> bool:
+        """A small body, and no option that speaks of PETSc's solvers."""
+        if begins_a_given_option("ts_", "snes_", "ksp_", "pc_", "mat_"):
             return False
         return envelope(*solver.matrix.mat.getRowIJ())[-1] <= MOST_ENTRIES
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from math import ceil, isfinite
+from math import isfinite
 
 from petsc4py import PETSc
 
 from ancf_petsc.errors import Interrupted, MotionStopped
-from ancf_petsc.motion.integrators import Integrator, Step
+from ancf_petsc.motion.integrators import Integrator, Step, steps_in
 
 log = logging.getLogger("ancf")
 
@@ -79,11 +79,6 @@ class TimeIntegration:
                 kept.copy(now)
             raise
         self.on_step(step)
-
-
-def steps_in(interval: float, step: float) -> int:
-    """The fewest equal steps, none longer than `step`, that fill an interval."""
-    return max(1, ceil(interval / step * (1 - 1e-9)))
 
 
 def warn_of_long_step(integrator: Integrator, size: float) -> None:

@@ -42,7 +42,7 @@ class MassSolver:
     def __init__(self, mass: Mass, way: str | None = None) -> None:
         self.mass = mass
         model = mass.assembly.model
-        self.free = model.motion[: model.owned] < 0
+        self.free = model.drive[: model.owned] < 0
         self._starts = envelope(*mass.assembly.graph) if mass.comm.size == 1 else np.zeros(1, np.int64)
         way = way or self._choose()
         self.is_factored = mass.lumped or way == "cholesky"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.algebra.graph import neighbours
-from ancf_petsc.parallel.exchange import exchange, first_of_each_rank, lookup, scatter_rows
+from ancf_petsc.parallel.exchange import exchange, first_of_each_rank, lookup
 from ancf_petsc.parallel.partition import partition_nodes
 from ancf_petsc.parallel.slabs import slab_bounds
 
@@ -45,16 +45,14 @@ class Numbering:
         )
 
 
-def with_vectors(nodes: Numbering, first: NDArray | None, node: NDArray, slot: NDArray) -> Numbering:
+def with_vectors(nodes: Numbering, first: NDArray, node: NDArray, slot: NDArray) -> Numbering:
     """The numbering of the nodal vectors of distributed nodes, several a node. Collective.
 
-    first: (n + 1,) first vector of each node in the table on the root rank. node, slot (a,): of each vector of a cell.
-    The vectors of a node follow each other; those of owned nodes come first.
+    first: (n, 2) first vector and number of vectors of each local node, in the table on the root rank. node, slot (a,): of each
+    vector of a cell. The vectors of a node follow each other; those of owned nodes come first.
     """
     comm = nodes.comm
-    total = int(comm.allreduce(nodes.owned))
-    both = None if first is None else np.stack((first[:-1], np.diff(first)), axis=1)
-    starts, counts = lookup(comm, slab_bounds(total, comm.size), scatter_rows(comm, both), nodes.file_nodes).T
+    starts, counts = first.T
     owned = int(counts[: nodes.owned].sum())
     begin = int(comm.scan(owned) - owned)
     local = np.concatenate(([0], np.cumsum(counts)))

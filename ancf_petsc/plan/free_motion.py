@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-AXES = ("x", "y", "z")
+from ancf_petsc.axes import AXES
 
 
 def free_motions(

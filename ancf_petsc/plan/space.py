@@ -109,7 +109,7 @@ class Space:
         found = rows_in(parts, rows, len(self.mesh.points))
         if (found < 0).any():
             raise MeshError(
-                f"{int((found < 0).sum())} of {len(parts)} parts of a group are no sides or edges of elements",
+                f"{int((found < 0).sum())} of the group's {len(parts)} facets are not a face or edge of any element",
                 file=self.mesh.source,
                 key="mesh.file",
                 cure="mesh the group and the body together",

@@ -11,6 +11,7 @@ import numpy as np
 import pyvista
 from numpy.typing import NDArray
 
+from ancf_petsc.axes import AXES
 from ancf_petsc.mesh.groups import surface_of
 from ancf_petsc.mesh.mesh import Group, Mesh
 from ancf_petsc.post.panels import COLOURS
@@ -18,13 +19,12 @@ from ancf_petsc.post.scene import DARK, MANY_CELLS, frame, make_plotter, matt, s
 from ancf_petsc.results.xdmf import CELL_KINDS
 
 Points = NDArray[np.float64]
-AXES = "xyz"
 GROUP_COLOURS = (COLOURS[2], COLOURS[4], COLOURS[5], COLOURS[3])  # what arrows have is left out
 HELD, MOVED, LOADED = "#444444", "#D55E00", "#0072B2"
 
 
 @dataclass(frozen=True)
-class Support:
+class Marked:
     """What happens to a group: components held, displacements of components moved, a total force."""
 
     group: str
@@ -40,20 +40,20 @@ class Support:
         return ", ".join(parts)
 
 
-def screenshot(mesh: Mesh, supports: Sequence[Support], title: str, note: str, file: Path) -> None:
+def screenshot(mesh: Mesh, supports: Sequence[Marked], title: str, note: str, file: Path) -> None:
     """A picture of the case."""
     plotter = scene(mesh, supports, title, note, off_screen=True)
     plotter.screenshot(str(file))
     plotter.close()
 
 
-def explore(mesh: Mesh, supports: Sequence[Support], title: str, note: str) -> None:
+def explore(mesh: Mesh, supports: Sequence[Marked], title: str, note: str) -> None:
     """A window to turn the case around."""
     scene(mesh, supports, title, note, off_screen=False).show(title=title)
 
 
 def scene(
-    mesh: Mesh, supports: Sequence[Support], title: str, note: str, *, off_screen: bool
+    mesh: Mesh, supports: Sequence[Marked], title: str, note: str, *, off_screen: bool
 ) -> pyvista.Plotter:
     """The body, translucent; its groups in colours with names; cones where it is held, arrows where moved."""
     plotter = make_plotter(off_screen=off_screen)
@@ -91,7 +91,7 @@ def _add_label(plotter: pyvista.Plotter, place: Points, text: str, colour: str) 
     )
 
 
-def _words(mesh: Mesh, supports: Sequence[Support]) -> dict[str, str]:
+def _words(mesh: Mesh, supports: Sequence[Marked]) -> dict[str, str]:
     """Name of each group and all that happens to it."""
     said = {
         name: ", ".join(support.words for support in supports if support.group == name)
@@ -100,7 +100,7 @@ def _words(mesh: Mesh, supports: Sequence[Support]) -> dict[str, str]:
     return {name: f"{name}: {words}" if words else name for name, words in said.items()}
 
 
-def _shown(mesh: Mesh, supports: Sequence[Support]) -> list[Group]:
+def _shown(mesh: Mesh, supports: Sequence[Marked]) -> list[Group]:
     """Groups of the case's supports first; whole bodies are no news."""
     used = dict.fromkeys(support.group for support in supports)
     names = [*used, *(name for name in mesh.groups if name not in used)]
@@ -129,7 +129,7 @@ def _paint(mesh: Mesh, group: Group) -> dict[str, object]:
     return {"point_size": 13, "render_points_as_spheres": True, "style": "points"}
 
 
-def _add_marks(plotter: pyvista.Plotter, mesh: Mesh, support: Support) -> Points:
+def _add_marks(plotter: pyvista.Plotter, mesh: Mesh, support: Marked) -> Points:
     """Cones and arrows at some of the group's nodes; the points (m, 3) they reach to."""
     size = mesh.size
     reached = [np.empty((0, 3))]

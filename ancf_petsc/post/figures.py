@@ -13,9 +13,9 @@ from ancf_petsc.errors import CaseError, did_you_mean
 from ancf_petsc.post.curves import is_compression
 from ancf_petsc.post.panels import (
     Columns,
+    Curves,
     Quantities,
     Runs,
-    Table,
     common_units,
     draw,
     draw_levels,
@@ -101,7 +101,7 @@ def energy(runs: Runs) -> Figure | None:
     return figure
 
 
-def energy_drift(curve: Table) -> Columns:
+def energy_drift(curve: Curves) -> Columns:
     """(rows,) kinetic + strain + dissipated - external work, less its first value, over the largest part."""
     parts = [sign * curve[name] for name, sign in BALANCE.items() if name in curve]
     total = np.sum(parts, axis=0)
@@ -128,7 +128,7 @@ def probes(runs: Runs) -> Figure | None:
     return figure
 
 
-def _travel(tables: Sequence[Table], names: Sequence[str], axes: str) -> float:
+def _travel(tables: Sequence[Curves], names: Sequence[str], axes: str) -> float:
     """The largest displacement of all probes along some axes."""
     columns = [f"{name}.u{axis}" for name in names for axis in axes]
     return max(np.abs(table[name]).max(initial=0.0) for table in tables for name in columns if name in table)

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from ancf_petsc.post.reference import Level, Reference
+from ancf_petsc.post.reference import Level, ReferenceCurve
 from ancf_petsc.post.units import Units, read_units, with_unit
 from ancf_petsc.results.reader import Results
 
@@ -53,9 +53,9 @@ STYLE = {
 }
 
 Columns = NDArray[np.float64]
-Table = Mapping[str, Columns]
+Curves = Mapping[str, Columns]
 Quantities = Mapping[str, str]  # column of a table -> words in the legend
-Runs = Sequence[Results | Reference]
+Runs = Sequence[Results | ReferenceCurve]
 
 
 def style() -> AbstractContextManager[None]:
@@ -73,7 +73,7 @@ def panels(count: int, heights: Sequence[float] | None = None) -> tuple[Figure, 
 
 def draw(
     axes: Axes,
-    tables: Sequence[Table],
+    tables: Sequence[Curves],
     quantities: Quantities,
     *,
     over: str = "",
@@ -112,7 +112,7 @@ def draw_levels(axes: Axes, levels: Sequence[Level]) -> None:
         )
 
 
-def time_of(table: Table) -> Columns:
+def time_of(table: Curves) -> Columns:
     return table["time"] if "time" in table else table["pseudo_time"]
 
 
@@ -155,7 +155,7 @@ def run_names(runs: Runs) -> list[str]:
     return titles if len(set(titles)) == len(titles) else [run.folder.resolve().name for run in runs]
 
 
-def present(quantities: Quantities, tables: Sequence[Table]) -> Quantities:
+def present(quantities: Quantities, tables: Sequence[Curves]) -> Quantities:
     """The quantities a table has and that in one of them are more than rounding."""
     sizes = {
         name: max(np.abs(table[name]).max(initial=0.0) for table in tables if name in table)

@@ -14,7 +14,7 @@ ABSCISSAS = ("time", "pseudo_time", "stroke")
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferenceCurve:
     """A table that figures draw beside runs, as one more run, where its columns have the runs' names."""
 
     title: str
@@ -36,7 +36,7 @@ class Level:
     value: float
 
 
-def read_reference(path: Path, beside: Results) -> Reference:
+def read_reference(path: Path, beside: Results) -> ReferenceCurve:
     """The CSV table in `path`, its numbers in the units of the run it is drawn beside."""
     table = read_table(path)
     abscissas = [name for name in ABSCISSAS if name in table]
@@ -48,7 +48,7 @@ def read_reference(path: Path, beside: Results) -> Reference:
             got=f"columns {', '.join(table)}",
             expected=f"{' or '.join(ABSCISSAS)}, and names of columns of the run's curve.csv or probes.csv",
         )
-    return Reference(path.stem, path, beside.units, table)
+    return ReferenceCurve(path.stem, path, beside.units, table)
 
 
 def read_level(text: str) -> Level:

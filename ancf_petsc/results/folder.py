@@ -45,7 +45,7 @@ def check_folder(path: Path, title: str, *, force: bool = False) -> None:
             "the folder is not empty",
             file=path,
             key="--out",
-            got=f"a run of {holds!r}" if holds is not None else "files that are no run",
+            got=f"a run of {holds!r}" if holds is not None else "files that do not belong to a run",
             expected=f"an empty folder, or a run of {title!r}",
             cure="choose another folder by --out DIR, or overwrite by --force",
         )

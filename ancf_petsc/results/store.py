@@ -38,7 +38,7 @@ class Slab:
 
 
 @dataclass(frozen=True)
-class Table:
+class Share:
     """A dataset, and this rank's rows of it."""
 
     dataset: Dataset
@@ -105,8 +105,8 @@ class ResultStore:
         where = Dataset("/mesh/points", (self._nodes.total, 3))
         topology = Dataset("/mesh/cells", (self._cells.total, *np.shape(cells)[1:]), integer=True)
         tables = [
-            Table(where, np.ascontiguousarray(points, float), self._nodes),
-            Table(topology, np.ascontiguousarray(cells, np.int64), self._cells),
+            Share(where, np.ascontiguousarray(points, float), self._nodes),
+            Share(topology, np.ascontiguousarray(cells, np.int64), self._cells),
             _numbers("/mesh/node_numbers", node_numbers, self._nodes),
             _numbers("/mesh/cell_numbers", cell_numbers, self._cells),
         ]
@@ -179,7 +179,7 @@ class ResultStore:
             if file:
                 file.id.close()
 
-    def _write(self, file: h5py.File | None, tables: list[Table]) -> None:
+    def _write(self, file: h5py.File | None, tables: list[Share]) -> None:
         """Make all datasets and write slabs; the root rank writes for all where this h5py cannot in parallel."""
         if not self.parallel:
             with self._agreed():
@@ -191,7 +191,7 @@ class ResultStore:
             for data, table in zip(made, tables, strict=True):
                 _write_rows(data, table.slab.start, table.rows)
 
-    def _write_through_root(self, file: h5py.File | None, tables: list[Table]) -> None:
+    def _write_through_root(self, file: h5py.File | None, tables: list[Share]) -> None:
         """One slab after the other, so that the root rank never holds a whole table."""
         places = self._gathered([(table.slab.start, len(table.rows)) for table in tables])
         if file is None:
@@ -232,15 +232,15 @@ class ResultStore:
             raise EnvironmentProblem(f"{self.path}: cannot be written: {reason}; look for space on the disk")
 
 
-def _field(path: str, rows: Array, slab: Slab, centre: str) -> Table:
+def _field(path: str, rows: Array, slab: Slab, centre: str) -> Share:
     """(m,), (m, 3) as they are; (m, 3, 3) as (m, 9)."""
     rows = np.ascontiguousarray(rows, float)
     rows = rows.reshape(len(rows), math.prod(rows.shape[1:])) if rows.ndim > 2 else rows
-    return Table(Dataset(path, (slab.total, *rows.shape[1:]), centre=centre), rows, slab)
+    return Share(Dataset(path, (slab.total, *rows.shape[1:]), centre=centre), rows, slab)
 
 
-def _numbers(path: str, rows: Array, slab: Slab) -> Table:
-    return Table(Dataset(path, (slab.total,), integer=True), np.ascontiguousarray(rows, np.int64), slab)
+def _numbers(path: str, rows: Array, slab: Slab) -> Share:
+    return Share(Dataset(path, (slab.total,), integer=True), np.ascontiguousarray(rows, np.int64), slab)
 
 
 def _put_number(group: h5py.Group, name: str, value: float) -> None:
@@ -249,7 +249,7 @@ def _put_number(group: h5py.Group, name: str, value: float) -> None:
     h5py.h5a.create(group.id, name.encode(), h5py.h5t.NATIVE_DOUBLE, space).write(np.array(value, float))
 
 
-def _create(file: h5py.File, table: Table) -> h5py.h5d.DatasetID:
+def _create(file: h5py.File, table: Share) -> h5py.h5d.DatasetID:
     """h5py's low-level calls: half the time of its datasets, which counts where steps are many and small."""
     kind = h5py.h5t.py_create(table.rows.dtype)
     space = h5py.h5s.create_simple(table.dataset.shape)

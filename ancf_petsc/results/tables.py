@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ancf_petsc.errors import CaseError
 
 
-class Table:
+class CsvTable:
     """Writer of a CSV file; every row is on disk when `append` returns."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:

@@ -24,7 +24,7 @@ log = logging.getLogger("ancf")
 
 
 @dataclass(frozen=True)
-class Step:
+class PathStep:
     """An accepted step of the path, told to whoever watches."""
 
     s: float
@@ -46,7 +46,7 @@ class LoadPath:
         outputs: Sequence[float],
         corners: Sequence[float],
         smallest_step: float,
-        on_step: Callable[[Step, PETSc.Vec], None],
+        on_step: Callable[[PathStep, PETSc.Vec], None],
         interrupted: Callable[[], bool] = lambda: False,
     ) -> None:
         self.newton = newton
@@ -89,7 +89,7 @@ class LoadPath:
                 )
             log.info("  step to s = %.6g failed (%s): halved to %.3g", target, outcome.reason, size)
             self._step = size
-        step = Step(target, target - self.s, outcome.newton, outcome.linear, outcome.residuals)
+        step = PathStep(target, target - self.s, outcome.newton, outcome.linear, outcome.residuals)
         self._accept(target, trial)
         self._adapt(step)
         self.on_step(step, self.x)
@@ -120,7 +120,7 @@ class LoadPath:
             return
         size = target - self.s
         model = self.assembly.model
-        ramps = [motion.ramp for motion in model.motions] + [load.ramp for load in model.loads]
+        ramps = [drive.ramp for drive in model.drives] + [load.ramp for load in model.loads]
         rises = [(ramp.rate(self.s) * size, ramp.value(target) - ramp.value(self.s)) for ramp in ramps]
         straight = all(isclose(rate, rise, rel_tol=1e-9, abs_tol=1e-12) for rate, rise in rises)
         if not straight and any(rate for rate, _ in rises):
@@ -139,7 +139,7 @@ class LoadPath:
             self._past.forget()
         self._past.add(s, x)
 
-    def _adapt(self, step: Step) -> None:
+    def _adapt(self, step: PathStep) -> None:
         """The size of the next step from how hard this one was."""
         if step.newton <= QUICK:
             self._step = max(self._step, step.size) * 2 if step.size >= 0.5 * self._step else self._step

@@ -47,7 +47,7 @@ def modes_at(assembly: Assembly, mass: Mass, x: PETSc.Vec, count: int) -> Modes:
     mass.add_to(inertia)
     inertia.close()
     scale = _scale(stiffness, mass)
-    free = assembly.comm.allreduce(int((assembly.model.motion[: assembly.model.owned] < 0).sum()))
+    free = assembly.comm.allreduce(int((assembly.model.drive[: assembly.model.owned] < 0).sum()))
     solver = _solver(
         stiffness, inertia, min(count, free), -1e-3 * scale / (assembly.model.dof / 3) ** (4 / 3)
     )

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
+from ancf_petsc.material.models import LAWS
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.solve.linear.solver import negative_pivots_of
 from ancf_petsc.solve.newton import Newton
 
-SVK_LIMIT = 1.0 / np.sqrt(3.0)
+NEAR_SOFTEST = 0.1
+"""Added to the stretch at which a law is softest: a weakest element below is taken for the reason."""
 LARGEST_TO_FACTOR = 300_000
 
 
@@ -53,10 +55,12 @@ def _definiteness(pivots: int | None) -> str:
 
 
 def _cure(law: str, stretch: float, pivots: int | None) -> str:
-    if law == "svk" and stretch < SVK_LIMIT + 0.1:
+    softest = LAWS[law].softest
+    if softest is not None and stretch < softest + NEAR_SOFTEST:
+        others = " or ".join(f'"{other.name}"' for other in LAWS.values() if other.softest is None)
         return (
-            f"svk carries no more force below a stretch of {SVK_LIMIT:.3f}: the path ends here whatever the "
-            'step size, and sooner on finer meshes; law = "neo_hooke" goes on'
+            f"{law} carries no more force below a stretch of {softest:.3f}: the path ends here whatever the "
+            f"step size, and sooner on finer meshes; law = {others} goes on"
         )
     if pivots:
         return "the body buckles or folds here: smaller loads, other supports, or damped dynamics go past it"

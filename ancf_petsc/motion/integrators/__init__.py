@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 
 from ancf_petsc.input.methods import HOME, METHODS
-from ancf_petsc.motion.integrators.base import Integrator, Settings, Step
+from ancf_petsc.motion.integrators.base import Integrator, Settings, Step, steps_in
 
 
 def integrator(name: str) -> type[Integrator]:
@@ -14,4 +14,4 @@ def integrator(name: str) -> type[Integrator]:
     return getattr(import_module(f"{HOME}.{module}"), kind)
 
 
-__all__ = ["Integrator", "Settings", "Step", "integrator"]
+__all__ = ["Integrator", "Settings", "Step", "integrator", "steps_in"]

@@ -4,26 +4,33 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.errors import MotionStopped
+from ancf_petsc.input.methods import METHODS
 from ancf_petsc.motion.equations import Equations
+from ancf_petsc.motion.fused import FusedMotion, fused_motion
 
 SHORTEST = 1e-13  # of the duration: a step so short does not move the clock reliably
 
 
+def steps_in(interval: float, step: float) -> int:
+    """The fewest equal steps, none longer than `step`, that fill an interval."""
+    return max(1, ceil(interval / step * (1 - 1e-9)))
+
+
 @dataclass(frozen=True)
 class Settings:
-    """What a case may set. step: 0 where the method chooses its steps by `tolerance`."""
+    """What a case may set. step: 0 where the method chooses its steps by `tolerance`. option: of the method's own key."""
 
     step: float = 0.0
     tolerance: float = 0.0
-    spectral_radius: float = 0.8
-    theta: float = 0.5
-    order: int = 2
+    option: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -62,10 +69,20 @@ class Integrator(ABC):
         self.ts.setExactFinalTime(PETSc.TS.ExactFinalTime.STEPOVER)
         self.ts.setErrorIfStepFails(False)
 
+    @cached_property
+    def fused(self) -> FusedMotion | None:
+        """The motion in compiled loops, where the body is simple enough."""
+        return fused_motion(self.equations)
+
     @property
     def adaptive(self) -> bool:
         """Whether the method chooses its steps."""
         return self.settings.step == 0.0
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether steps are made in compiled loops."""
+        return False
 
     @property
     def leaps(self) -> bool:
@@ -101,7 +118,8 @@ class Integrator(ABC):
     def failed(self, goal: float, why: str) -> MotionStopped:
         """The error of a step that failed."""
         cure = "a smaller tolerance" if self.adaptive else "a smaller dynamics.step"
-        hint = "" if self.name == "energy_momentum" else ', or integrator = "energy_momentum"'
+        others = " or ".join(f'"{row.name}"' for row in METHODS.values() if row.conserves)
+        hint = "" if METHODS[self.name].conserves else f", or integrator = {others}"
         return MotionStopped(
             f"{self.name} cannot go on from time {self.time:.6g} to {goal:.6g}: {why}; try {cure}{hint}"
         )

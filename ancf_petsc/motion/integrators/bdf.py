@@ -16,7 +16,7 @@ class Bdf(ImplicitFirstOrder):
     type_name = PETSc.TS.Type.BDF
 
     def options(self) -> Mapping[str, object]:
-        return {"ts_bdf_order": self.settings.order}
+        return {"ts_bdf_order": self.settings.option}
 
     def describe(self) -> str:
-        return f"{super().describe()}, order {self.settings.order}"
+        return f"{super().describe()}, order {self.settings.option}"

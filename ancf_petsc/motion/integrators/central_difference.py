@@ -14,8 +14,7 @@ from petsc4py import PETSc
 
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.fused import FusedMotion
-from ancf_petsc.motion.integration import steps_in
-from ancf_petsc.motion.integrators.base import Integrator, Settings, Step
+from ancf_petsc.motion.integrators.base import Integrator, Settings, Step, steps_in
 
 
 class CentralDifference(Integrator):
@@ -30,8 +29,12 @@ class CentralDifference(Integrator):
         self._begun = False
 
     @property
+    def is_compiled(self) -> bool:
+        return self.fused is not None
+
+    @property
     def leaps(self) -> bool:
-        return self.equations.fused is not None
+        return self.is_compiled
 
     @property
     def longest_stable(self) -> float:
@@ -42,8 +45,7 @@ class CentralDifference(Integrator):
     def advance(self, goal: float) -> Step:
         if not self._begun:
             self.restart()
-        fused = self.equations.fused
-        return self._step(goal) if fused is None else self._leap(goal, fused)
+        return self._step(goal) if self.fused is None else self._leap(goal, self.fused)
 
     def restart(self) -> None:
         v = self.v.array_r.reshape(-1, 3)

@@ -15,8 +15,8 @@ from petsc4py import PETSc
 from ancf_petsc.errors import CaseError
 from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.motion.equations import Equations
+from ancf_petsc.motion.increment import Forces
 from ancf_petsc.motion.integrators.base import Settings
-from ancf_petsc.motion.integrators.increment import Forces
 from ancf_petsc.motion.integrators.one_step import OneStep
 from ancf_petsc.parallel.exchange import combined
 

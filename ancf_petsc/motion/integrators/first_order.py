@@ -42,7 +42,7 @@ class FirstOrder(Integrator):
         x, v = self._stage_x, self._stage_v
         both = y.array_r
         x.array[:], v.array[:] = both[: self._own], both[self._own :]
-        if self.equations.moving:
+        if self.equations.is_driven:
             self.equations.place(x, v, t)
         return x, v.array_r.reshape(-1, 3)
 
@@ -88,7 +88,7 @@ class FirstOrder(Integrator):
         """The state from y."""
         both = self.y.array_r
         self.x.array[:], self.v.array[:] = both[: self._own], both[self._own :]
-        if self.equations.moving:
+        if self.equations.is_driven:
             self.equations.place(self.x, self.v, self.time)
 
     def _propose(self, asked: float, done: float) -> None:

@@ -17,9 +17,8 @@ from ancf_petsc.kernel.implicit import Scheme
 from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.fused_newton import FusedNewton
-from ancf_petsc.motion.integration import steps_in
-from ancf_petsc.motion.integrators.base import Integrator, Settings, Step
-from ancf_petsc.motion.integrators.increment import Forces
+from ancf_petsc.motion.increment import Forces
+from ancf_petsc.motion.integrators.base import Integrator, Settings, Step, steps_in
 from ancf_petsc.motion.integrators.one_step import OneStep
 
 
@@ -29,24 +28,27 @@ class GeneralizedAlpha(OneStep):
     name = "generalized_alpha"
 
     def __init__(self, equations: Equations, settings: Settings, x: PETSc.Vec, v: PETSc.Vec) -> None:
-        radius = settings.spectral_radius
+        radius = settings.option
         self.alpha_m, self.alpha_f = (2 - radius) / (1 + radius), 1 / (1 + radius)
         self.gamma = 0.5 + self.alpha_m - self.alpha_f
         self.beta = 0.25 * (1 + self.alpha_m - self.alpha_f) ** 2
         super().__init__(equations, settings, x, v)
         self._still = np.zeros((0, 3))
-        self._fused: FusedNewton | None = None
-        fused = equations.fused
-        if fused is not None and FusedNewton.fits(equations, self.solver):
-            self._fused = FusedNewton(fused, equations, self.solver)
+        self._newton: FusedNewton | None = None
+        if self.fused is not None and FusedNewton.fits(self.solver):
+            self._newton = FusedNewton(self.fused, equations, self.solver)
         self.restart()
 
     @property
+    def is_compiled(self) -> bool:
+        return self._newton is not None
+
+    @property
     def leaps(self) -> bool:
-        return self._fused is not None
+        return self.is_compiled
 
     def advance(self, goal: float) -> Step:
-        return super().advance(goal) if self._fused is None else self._leap(goal, self._fused)
+        return super().advance(goal) if self._newton is None else self._leap(goal, self._newton)
 
     def restart(self) -> None:
         self.a = self.equations.acceleration(self.time, self.x, self.v.array_r.reshape(-1, 3))
@@ -56,7 +58,7 @@ class GeneralizedAlpha(OneStep):
         h, v = self.h, self.v.array_r.reshape(-1, 3)
         a1 = (d - h * v) / (self.beta * h * h) - (0.5 / self.beta - 1) * self.a
         v1 = v + h * ((1 - self.gamma) * self.a + self.gamma * a1)
-        if self.equations.moving:
+        if self.equations.is_driven:
             driven = self.equations.assembly.driven
             a1.ravel()[driven] = self.equations.driven_accelerations(self.goal)
             v1.ravel()[driven] = self.equations.driven_velocities(self.goal)
@@ -70,7 +72,7 @@ class GeneralizedAlpha(OneStep):
     def forces(self, d: PETSc.Vec) -> Forces:
         part, time = self.alpha_f, self.time + self.alpha_f * self.h
         carried = self._inertia * d.array_r.reshape(-1, 3)
-        if self.equations.moving:
+        if self.equations.is_driven:
             carried.ravel()[self.equations.assembly.driven] = 0.0
         carried += self._still
         values, squared = self.unbalance(time, d, part, carried)
@@ -119,7 +121,7 @@ class GeneralizedAlpha(OneStep):
         return Step(self.time, size * (done + 1), newton, linear, count=done + 1)
 
     def describe(self) -> str:
-        if self._fused is not None:
+        if self._newton is not None:
             how = f"{Integrator.describe(self)}, compiled Newton + cholesky, {self.solver.linear.dof} degrees of freedom"
-            return f"{how}, spectral radius {self.settings.spectral_radius:g}"
-        return f"{super().describe()}, spectral radius {self.settings.spectral_radius:g}"
+            return f"{how}, spectral radius {self.settings.option:g}"
+        return f"{super().describe()}, spectral radius {self.settings.option:g}"

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.motion.equations import Equations
+from ancf_petsc.motion.increment import MOST_ITERATIONS, ForceTest
 from ancf_petsc.motion.integrators.base import Settings
 from ancf_petsc.motion.integrators.first_order import FirstOrder
-from ancf_petsc.motion.integrators.increment import MOST_ITERATIONS, ForceTest
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.linear.solver import LinearSolver
 from ancf_petsc.solve.petsc import default_options
@@ -82,7 +82,7 @@ class ImplicitFirstOrder(FirstOrder):
         x, v = self.stage(y, t)
         given = rate.array_r[n:].reshape(-1, 3) + equations.damping * v
         driven = equations.assembly.driven
-        if equations.moving:
+        if equations.is_driven:
             given.ravel()[driven] = equations.driven_accelerations(t) + equations.damping * v.ravel()[driven]
         inertia, loads = equations.mass.times(given), equations.loads(t)
         internal, _ = equations.assembly.internal_force(x)
@@ -127,7 +127,7 @@ class _Eliminated:
         self.shift = 0.0
         assembly = owner.equations.assembly
         self.ksp = PETSc.KSP().create(assembly.comm)
-        self.linear = LinearSolver(assembly, owner.matrix, self.ksp, moving=True)
+        self.linear = LinearSolver(assembly, owner.matrix, self.ksp, with_mass=True)
         self.ksp.setFromOptions()
         self._right, self._answer = assembly.vector(), assembly.vector()
 

@@ -13,8 +13,8 @@ from petsc4py import PETSc
 
 from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.motion.equations import Equations
+from ancf_petsc.motion.increment import Forces, IncrementSolver
 from ancf_petsc.motion.integrators.base import Integrator, Settings, Step
-from ancf_petsc.motion.integrators.increment import Forces, IncrementSolver
 
 
 class _Context:
@@ -97,9 +97,9 @@ class OneStep(Integrator):
     def unbalance(self, t: float, d: PETSc.Vec, part: float, carried: NDArray) -> tuple[NDArray, float]:
         """M carried + Q(x + part d) - Q_e(t) (n, 3), and the sum of squares of the three on this rank."""
         eq = self.equations
-        if eq.fused is not None:
+        if self.fused is not None:
             states = (self.x.array_r.reshape(-1, 3), d.array_r.reshape(-1, 3))
-            return eq.fused.unbalance(t, *states, part, carried)
+            return self.fused.unbalance(t, *states, part, carried)
         inertia, loads = eq.mass.times(carried), eq.loads(t)
         internal, _ = eq.assembly.internal_force(self.between(d, part))
         return inertia + internal - loads, self.squared(inertia, internal, loads)
@@ -112,7 +112,7 @@ class OneStep(Integrator):
     def _step(self, ts: PETSc.TS) -> None:
         guess = self.guess()
         driven = self.equations.assembly.driven
-        if self.equations.moving:
+        if self.equations.is_driven:
             before = self.x.array_r[driven]
             guess.ravel()[driven] = self.equations.driven_positions(self.goal) - before
         self._why = self.solver.solve(guess)
@@ -121,7 +121,7 @@ class OneStep(Integrator):
             return
         self._known = self.finish(self.solver.d.array_r.reshape(-1, 3))
         self.x.axpy(1.0, self.solver.d)
-        if self.equations.moving:
+        if self.equations.is_driven:
             self.x.array[driven] = self.equations.driven_positions(self.goal)
         ts.setTime(self.goal)
 

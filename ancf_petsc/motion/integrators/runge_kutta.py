@@ -31,12 +31,15 @@ class RungeKutta5dp(FirstOrder):
         with default_options({"ts_adapt_type": "basic" if self.adaptive else "none"}):
             self.ts.setFromOptions()
         self.begin(self.longest_stable)
-        fused, free = equations.fused, not begins_a_given_option("ts_")
-        fits = fused is not None and fused.steady and free and self.adaptive and self.table == "5dp"
-        self._fused = fused if fits else None
+        free = self.adaptive and self.table == "5dp" and not begins_a_given_option("ts_")
+        self._leaping = self.fused if free and self.fused is not None and self.fused.steady else None
+
+    @property
+    def is_compiled(self) -> bool:
+        return self._leaping is not None
 
     def advance(self, goal: float) -> Step:
-        return super().advance(goal) if self._fused is None else self._leap(goal, self._fused)
+        return super().advance(goal) if self._leaping is None else self._leap(goal, self._leaping)
 
     def _leap(self, goal: float, fused: FusedMotion) -> Step:
         tolerance, before = self.settings.tolerance, self.time
@@ -61,14 +64,14 @@ class RungeKutta5dp(FirstOrder):
         return self.highest_stable / omega if omega else self.equations.duration
 
     def _rates(self, ts: PETSc.TS, t: float, y: PETSc.Vec, f: PETSc.Vec) -> None:
-        if self.equations.fused is not None:
-            self.equations.fused.rates(t, y.array_r, f.array_w)
+        if self.fused is not None:
+            self.fused.rates(t, y.array_r, f.array_w)
             return
         x, v = self.stage(y, t)
         a = self.equations.acceleration(t, x, v)
         rates = f.array
         rates[: self._own], rates[self._own :] = v.ravel(), a.ravel()
-        if self.equations.moving:
+        if self.equations.is_driven:
             driven = self.equations.assembly.driven
             rates[driven] = rates[self._own + driven] = 0.0
 

@@ -16,7 +16,7 @@ class Theta(ImplicitFirstOrder):
     type_name = PETSc.TS.Type.THETA
 
     def options(self) -> Mapping[str, object]:
-        return {"ts_theta_theta": self.settings.theta, "ts_theta_endpoint": True}
+        return {"ts_theta_theta": self.settings.option, "ts_theta_endpoint": True}
 
     def describe(self) -> str:
-        return f"{super().describe()}, theta {self.settings.theta:g}"
+        return f"{super().describe()}, theta {self.settings.option:g}"

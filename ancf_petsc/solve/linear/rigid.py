@@ -18,7 +18,7 @@ def rigid_motions(model: Model, positions: NDArray) -> NDArray[np.float64]:
     own = model.own_positions
     count = combined(model.comm, len(own))
     centre = combined(model.comm, positions[own].sum(axis=0)) / count
-    undriven = model.motion[: model.owned] < 0
+    undriven = model.drive[: model.owned] < 0
     free = combined(model.comm, undriven.sum(axis=0)) > 0
     arms = positions / model.size
     arms[own] -= centre / model.size

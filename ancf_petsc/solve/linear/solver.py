@@ -30,15 +30,17 @@ GAMG_THRESHOLD = 0.01  # drops weak couplings from the aggregates: fewer iterati
 
 
 class LinearSolver:
-    """Sets up a KSP for one matrix of an assembly. moving: with the mass in it."""
+    """Sets up a KSP for one matrix of an assembly. with_mass: in motion."""
 
-    def __init__(self, assembly: Assembly, matrix: Matrix, ksp: PETSc.KSP, *, moving: bool = False) -> None:
+    def __init__(
+        self, assembly: Assembly, matrix: Matrix, ksp: PETSc.KSP, *, with_mass: bool = False
+    ) -> None:
         self.assembly, self.matrix = assembly, matrix
         self.ksp = ksp
         self.dof = assembly.model.dof
-        self.small = moving and assembly.comm.size == 1 and self.dof <= SMALL
+        self.small = with_mass and assembly.comm.size == 1 and self.dof <= SMALL
         chosen = is_given("ksp_type") or is_given("pc_type")
-        limit = CURVED_LIMIT if assembly.model.element.is_curved else SMALL if moving else DIRECT_LIMIT
+        limit = CURVED_LIMIT if assembly.model.element.is_curved else SMALL if with_mass else DIRECT_LIMIT
         self.direct = self.dof <= limit and not chosen
         self._fresh_rate: float | None = None
         self._rate: float | None = None

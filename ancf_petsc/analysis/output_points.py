@@ -1,11 +1,11 @@
-"""Fields on nodal vectors as fields on drawn points, in the file's order."""
+"""Fields on nodal vectors as fields on the points of the results, in the file's order."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ancf_petsc.analysis.build import FileOrder
+from ancf_petsc.analysis.file_order import FileOrder
 from ancf_petsc.kernel.tables import turn_functions
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import ToSlabs
@@ -13,8 +13,8 @@ from ancf_petsc.parallel.exchange import ToSlabs
 Floats = NDArray[np.float64]
 
 
-class DrawnPoints:
-    """Points of the drawn body: its nodes and, where edges are curved, their middles. Calls are collective."""
+class OutputPoints:
+    """Points of the results: nodes and, where edges are curved, their middles. Calls are collective."""
 
     def __init__(self, assembly: Assembly, order: FileOrder) -> None:
         self.assembly, self.order = assembly, order
@@ -30,7 +30,7 @@ class DrawnPoints:
         self._weights = turn_functions(values[edges], maps[cells], row)
 
     def __call__(self, field: Floats) -> Floats:
-        """A field (n, 3) on owned nodal vectors, as positions are, on this rank's slab of drawn points (m, 3)."""
+        """A field (n, 3) on owned nodal vectors, as positions are, on this rank's slab of the points (m, 3)."""
         local = self.assembly.with_ghosts(field, np.empty_like(self.assembly.model.reference))
         middles = np.einsum("pa,pai->pi", self._weights, local[self._vectors])
         return self._slab(np.concatenate((field[self._own], middles)))

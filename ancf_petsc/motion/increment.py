@@ -18,10 +18,10 @@ from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.linear.solver import LinearSolver
+from ancf_petsc.solve.newton import MOST_ITERATIONS
 from ancf_petsc.solve.petsc import default_options
 
 Reason = PETSc.SNES.ConvergedReason
-MOST_ITERATIONS = 25
 SLOW = 0.1  # a residual that falls by less asks for a new matrix: factoring costs some five iterations
 ROUNDING = 4e-16  # of a position: what it leaves of forces is this times stiffness and position
 WORDS = {
@@ -105,7 +105,7 @@ class IncrementSolver:
         self._always_new = False
         self._residual = self.assembly.vector()
         self._quick = self._create("basic")
-        self.linear = LinearSolver(self.assembly, self.matrix, self._quick.getKSP(), moving=True)
+        self.linear = LinearSolver(self.assembly, self.matrix, self._quick.getKSP(), with_mass=True)
         with default_options({"snes_linesearch_type": "basic"}):
             self._quick.setFromOptions()
         self._careful = self._create("bt")

@@ -1,0 +1,3 @@
+"""The names of the axes, in the order of components."""
+
+AXES = ("x", "y", "z")

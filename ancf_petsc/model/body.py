@@ -1,0 +1,100 @@
+"""The undeformed body on this rank: nodal vectors, cells, laws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ancf_petsc.element.element import Element
+from ancf_petsc.kernel.mean import MeanKernels
+from ancf_petsc.kernel.tables import turn_functions
+from ancf_petsc.kernel.tet3413 import Kernels
+from ancf_petsc.material import Law
+from ancf_petsc.parallel.exchange import combined
+from ancf_petsc.parallel.numbering import Numbering
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Region:
+    """Cells first:last of one material; those before own_last are owned by this rank.
+
+    kernels, mean_kernels: compiled loops for the element and the law; the latter keep energy, where there are such.
+    """
+
+    law: Law
+    kernels: Kernels
+    mean_kernels: MeanKernels | None
+    parameters: Floats
+    density: float | None
+    first: int
+    own_last: int
+    last: int
+
+
+@dataclass(frozen=True)
+class Body:
+    """v local nodal vectors (owned first), e local cells, those of one region together and its own ones first.
+
+    reference (v, 3): nodal vectors of the undeformed body. slots (v,): 0 for a position, j for the j-th slope of its node, which
+    follows the position j places behind. Slopes are multiplied by lengths.
+    tables: arrays of the cells that every kernel takes; the first is cells (e, a), the third volumes (e,).
+    size: diagonal of the box around the body. cell_numbers: (e,) number of each cell in the mesh file.
+    """
+
+    comm: MPI.Comm
+    element: Element
+    numbering: Numbering
+    reference: Floats
+    slots: NDArray[np.int8]
+    tables: tuple
+    regions: tuple[Region, ...]
+    size: float
+    cell_numbers: NDArray[np.int64]
+
+    @property
+    def owned(self) -> int:
+        """How many nodal vectors this rank owns."""
+        return self.numbering.owned
+
+    @property
+    def ghost_numbers(self) -> NDArray[np.int64]:
+        """Global numbers of the nodal vectors that other ranks own."""
+        return self.numbering.numbers[self.owned :]
+
+    @property
+    def cells(self) -> NDArray[np.int32]:
+        """(e, a) local nodal vectors of each cell."""
+        return self.tables[0]
+
+    @property
+    def volumes(self) -> Floats:
+        """(e,) undeformed volumes."""
+        return self.tables[2]
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom over all ranks, driven ones included."""
+        return combined(self.comm, self.element.components * self.owned)
+
+    @property
+    def own_positions(self) -> NDArray[np.int64]:
+        """The owned nodal vectors that are positions."""
+        return np.flatnonzero(self.slots[: self.owned] == 0)
+
+    def turned(self, values: NDArray) -> Floats:
+        """Functions (e, a) of the nodal vectors of all cells from those of the reference cell (a,)."""
+        return turn_functions(values, self.slope_maps, self.element)
+
+    @property
+    def slope_maps(self) -> Floats:
+        """(e, s, 3, 3) from the slopes of the nodes of each cell to those along xi; no s without slopes."""
+        return self.tables[1].jacobians if self.element.has_slopes else np.empty((len(self.cells), 0, 3, 3))
+
+    def position_cells(self) -> NDArray[np.int32]:
+        """(e, k) the positions of the nodes of each cell."""
+        return self.cells[:, self.element.slot == 0]

@@ -1,0 +1,32 @@
+"""Weight: an acceleration on all mass."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ancf_petsc.input.loads import GravitySpec
+from ancf_petsc.model.body import Body, Floats
+from ancf_petsc.model.load import Load
+from ancf_petsc.model.ramp import Ramp
+from ancf_petsc.plan.part import Part
+
+
+def enter(spec: GravitySpec, part: Part, key: str) -> None:
+    """Nothing: the mass is that of the body's cells."""
+
+
+def share(spec: GravitySpec, body: Body, entered: Floats | None, ramp: Ramp) -> Load:
+    """Mass times acceleration."""
+    return Load(np.outer(nodal_mass(body), spec.acceleration), ramp, spec.acceleration)
+
+
+def nodal_mass(body: Body) -> Floats:
+    """∫ rho N_a dV (n,) of the owned nodal vectors."""
+    density = np.empty(len(body.cells))
+    for region in body.regions:
+        density[region.first : region.last] = region.density or 0.0
+    tables = body.element.tables("mass")
+    means = body.turned(tables.weights @ tables.values / tables.weights.sum())
+    share = (density * body.volumes)[:, None] * means
+    sums = np.bincount(body.cells.ravel(), share.ravel(), minlength=len(body.reference))
+    return sums[: body.owned].astype(float)

@@ -1,0 +1,47 @@
+"""When a static case writes: steps, times or strokes as pseudo-times."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ancf_petsc.errors import CaseError
+from ancf_petsc.input.schema import CaseSpec
+from ancf_petsc.model.ramp import make_ramp
+
+
+def output_times(spec: CaseSpec, file: Path | None = None) -> list[float]:
+    """Pseudo-times of the outputs of a static case, ascending, the last is 1."""
+    statics = spec.statics
+    assert statics is not None
+    if statics.times:
+        return sorted({*statics.times, 1.0})
+    if statics.strokes:
+        return sorted({*_stroke_times(spec, statics.strokes, file), 1.0})
+    assert statics.steps
+    return [k / statics.steps for k in range(1, statics.steps + 1)]
+
+
+def _stroke_times(spec: CaseSpec, strokes: tuple[float, ...], file: Path | None) -> list[float]:
+    """When the ramp of the driven group first reaches each stroke."""
+    curve = spec.output.curve
+    assert curve is not None
+    axis: Any = curve.stroke.axis
+    driver = next(c for c in spec.constraint if c.group == curve.stroke.group and axis in c.move)
+    amplitude = abs(driver.move[axis])
+    ramp = make_ramp(driver.ramp, "linear")
+    times = []
+    for stroke in strokes:
+        s = ramp.first_time(
+            min(stroke / amplitude, 1.0) if stroke <= amplitude * (1 + 1e-12) else stroke / amplitude
+        )
+        if s is None:
+            raise CaseError(
+                file=file,
+                key="statics.strokes",
+                got=stroke,
+                expected=f"a stroke that the motion of {driver.group!r} reaches",
+                cure=f"it moves by {amplitude:g} at most",
+            )
+        times.append(s)
+    return [s for s in times if s > 0.0]

@@ -1,0 +1,82 @@
+"""The part of a mesh that is planned here, which entries of a case look at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ancf_petsc.axes import AXES
+from ancf_petsc.element.element import Element
+from ancf_petsc.errors import CaseError
+from ancf_petsc.input.load import Case
+from ancf_petsc.input.schema import CaseSpec
+from ancf_petsc.mesh.groups import find_group
+from ancf_petsc.mesh.mesh import Group, Mesh
+from ancf_petsc.plan.space import Space
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Part:
+    """A case's mesh and space with what entries ask of them; tables are over its v nodal vectors and e cells, in file order.
+
+    Today one part, on the root rank, is all of the mesh. Entries speak of a part nevertheless, and of sums over all parts
+    (`total`), so that none of them stands in the way of reading and planning on every rank. normal: the axis that a plane body
+    does not move along, None for a body in space.
+    """
+
+    def __init__(self, case: Case, mesh: Mesh, element: Element) -> None:
+        self.file: Path | None = case.file
+        self.spec: CaseSpec = case.spec
+        self.mesh, self.element = mesh, element
+        self.space = Space(mesh, element)
+        self.normal = self._normal()
+
+    @property
+    def vectors(self) -> int:
+        """How many nodal vectors the part has."""
+        return self.space.vectors
+
+    def group(self, name: str, key: str) -> Group:
+        """A group of the case. Raises CaseError that names the key."""
+        return find_group(self.mesh, name, key, self.file)
+
+    def positions(self, group: Group) -> Integers:
+        """The nodal vectors that are positions of a group's nodes."""
+        return self.space.first[self.space.compact[group.nodes]]
+
+    def members(self, group: Group) -> NDArray[np.bool_]:
+        """(v,) whether a nodal vector is the position of one of the group's nodes."""
+        inside = np.zeros(self.vectors, bool)
+        inside[self.positions(group)] = True
+        return inside
+
+    def node_mean(self, group: Group) -> Floats:
+        """(v,) weights of the mean position of a group's nodes."""
+        return self.members(group) / self.total(len(group.nodes))
+
+    def total(self, number: float) -> float:
+        """The sum of a number over all parts."""
+        return number
+
+    def _normal(self) -> int | None:
+        """Of a straight beam it is an axis that the case does not speak of."""
+        if self.element.components == 3:
+            return None
+        flat = [i for i in range(3) if np.abs(self.space.axes[i]).max() < 1e-9]
+        if not flat:
+            raise CaseError(
+                "the beam lies along no plane of the axes",
+                file=self.file,
+                key="mesh.file",
+                expected="a line in a plane x-y, y-z or z-x",
+                cure="turn the mesh",
+            )
+        vectors = [load.vector for load in self.spec.load]
+        vectors += [self.spec.initial.velocity] if self.spec.initial else []
+        used = {i for vector in vectors for i in range(3) if vector[i]}
+        used |= {AXES.index(axis) for spec in self.spec.constraint for axis in (*spec.move, *spec.slopes)}
+        return next((i for i in reversed(flat) if i not in used), flat[-1])

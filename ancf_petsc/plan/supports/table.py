@@ -1,0 +1,99 @@
+"""Which degrees of freedom are driven, and by what."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ancf_petsc.axes import AXES
+from ancf_petsc.errors import CaseError
+from ancf_petsc.mesh.groups import parts_for_support
+from ancf_petsc.mesh.mesh import Group
+from ancf_petsc.model.drive import HELD, Drive
+from ancf_petsc.plan.part import Part
+from ancf_petsc.plan.slopes import Parts, prescribed_slopes
+
+
+class SupportTable:
+    """drive (v, 3): index into drives of each degree of freedom of a part's nodal vectors, -1 where it is free.
+
+    Supports enter it with `prescribe` and `hold`; `finish` adds what follows from all of them.
+    """
+
+    def __init__(self, part: Part) -> None:
+        self.part = part
+        self.drive = np.full((part.vectors, 3), -1, np.int32)
+        self.drives: list[Drive] = []
+        self._groups: list[str] = []
+        self._source = np.full((part.vectors, 3), -1, np.int32)
+        self._surfaces: list[tuple[set[int], Parts]] = []
+        self._held: list[tuple[NDArray[np.int64], int]] = []
+
+    def prescribe(self, group: Group, drives: Mapping[int, Drive]) -> None:
+        """Let components of the positions of a group's nodes follow drives: axis -> drive.
+
+        The slopes along what the group is meshed with are held. Raises CaseError where another support drives the same degree of
+        freedom differently.
+        """
+        vectors = self.part.positions(group)
+        self._groups.append(group.name)
+        for axis, drive in drives.items():
+            index = self._index_of(drive)
+            present = self.drive[vectors, axis]
+            clash = (present >= 0) & (present != index)
+            if clash.any():
+                raise self._contradiction(group.name, vectors[clash], axis, drive)
+            self.drive[vectors, axis] = index
+            self._source[vectors, axis] = len(self._groups) - 1
+        if self.part.element.has_slopes:
+            self._surfaces.append((set(drives), parts_for_support(self.part.mesh, group)))
+
+    def hold(self, vectors: NDArray[np.int64], axis: int) -> None:
+        """Hold a component of nodal vectors where nothing else drives it, once all supports are known."""
+        self._held.append((vectors, axis))
+
+    def finish(self) -> None:
+        """Hold the slopes along surfaces and lines whose positions are prescribed, and what else is to be held."""
+        if self.part.element.has_slopes:
+            self._hold_slopes_along_surfaces()
+        for vectors, axis in self._held:
+            self._hold(vectors, axis)
+        if self.part.normal is not None:
+            self._hold(np.arange(self.part.vectors), self.part.normal)
+
+    def _hold_slopes_along_surfaces(self) -> None:
+        held, odd = prescribed_slopes(self.part.space, self._surfaces)
+        for axis in range(3):
+            self._hold(np.flatnonzero(held[:, axis]), axis)
+        if odd:
+            self.part.mesh.notes.append(
+                f"at {odd} nodes surfaces at odd angles hold different components: all slopes of these components are held"
+            )
+
+    def _hold(self, vectors: NDArray[np.int64], axis: int) -> None:
+        if len(vectors):
+            free = vectors[self.drive[vectors, axis] < 0]
+            self.drive[free, axis] = self._index_of(HELD)
+
+    def _index_of(self, drive: Drive) -> int:
+        if drive.amplitude == 0.0:
+            drive = HELD
+        if drive not in self.drives:
+            self.drives.append(drive)
+        return self.drives.index(drive)
+
+    def _contradiction(self, group: str, vectors: NDArray[np.int64], axis: int, drive: Drive) -> CaseError:
+        space, first = self.part.space, vectors[0]
+        node = self.part.mesh.node_numbers[space.nodes[space.node_of()[first]]]
+        other = self._groups[self._source[first, axis]]
+        return CaseError(
+            f"the constraints on {other!r} and {group!r} contradict each other: "
+            f"{len(vectors)} nodes are driven twice in {AXES[axis]}, "
+            f"the first is node {node}",
+            key=f"constraint.{group}.{AXES[axis]}",
+            got=drive.describe(),
+            expected=f"{self.drives[self.drive[first, axis]].describe()} as {other!r} asks",
+            cure="fix or move each degree of freedom once, or take the shared nodes out of one group",
+        )
