@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ancf_petsc.element.cell import CELLS, Cell
 from ancf_petsc.mesh.mesh import Floats, Integers
 
 Corners = tuple[tuple[int, ...], ...]
@@ -21,8 +22,6 @@ class Kind:
 
     nodes: how many a cell has; the first `corners` of them are its corners.
     linear: the kind of its corners alone.
-    sides: parts one dimension lower, seen from outside counterclockwise.
-    edges: pairs of corners.
     frames: a corner and its neighbours, right-handed: their determinants are positive in a good cell.
     turned: the order of nodes that mirrors the cell.
     simplices, fold: simplices that cover the cell `fold` times (both diagonals of every quadrilateral).
@@ -33,8 +32,6 @@ class Kind:
     dimension: int
     nodes: int
     linear: str = ""
-    sides: Corners = ()
-    edges: Corners = ()
     frames: Corners = ()
     turned: tuple[int, ...] = ()
     simplices: Corners = ()
@@ -42,6 +39,21 @@ class Kind:
     gmsh: int = 0
     gmsh_order: tuple[int, ...] = ()
     ideal: Floats = field(default_factory=lambda: np.eye(3))
+
+    @property
+    def cell(self) -> Cell | None:
+        """The reference cell of its corners, where elements are made of such cells."""
+        return CELLS.get(self.linear or self.name)
+
+    @property
+    def sides(self) -> Corners:
+        """Parts one dimension lower, seen from outside counterclockwise; none where there is no reference cell."""
+        return self.cell.facets if self.cell else ()
+
+    @property
+    def edges(self) -> Corners:
+        """Pairs of corners; none where there is no reference cell."""
+        return self.cell.edges if self.cell else ()
 
     @property
     def corners(self) -> int:
@@ -58,27 +70,18 @@ _REGULAR_TRIANGLE = np.array([[1, 0.5], [0, np.sqrt(3) / 2]])
 _REGULAR_TETRAHEDRON = np.array([[1, 0.5, 0.5], [0, np.sqrt(3) / 2, np.sqrt(3) / 6], [0, 0, np.sqrt(2 / 3)]])
 _TETRA: dict[str, Any] = {
     "dimension": 3,
-    "sides": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
-    "edges": ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)),
     "frames": ((0, 1, 2, 3),),
     "simplices": ((0, 1, 2, 3),),
     "ideal": _REGULAR_TETRAHEDRON,
 }
 _TRIANGLE: dict[str, Any] = {
     "dimension": 2,
-    "sides": ((0, 1), (1, 2), (2, 0)),
-    "edges": ((0, 1), (1, 2), (2, 0)),
     "frames": ((0, 1, 2),),
     "simplices": ((0, 1, 2),),
     "ideal": _REGULAR_TRIANGLE,
 }
 _HEXAHEDRON: dict[str, Any] = {
     "dimension": 3,
-    "sides": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
-    "edges": (
-        *((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)),
-        *((0, 4), (1, 5), (2, 6), (3, 7)),
-    ),
     "frames": (
         *((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7)),
         *((4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3)),
@@ -95,8 +98,6 @@ KINDS = {
             "line",
             1,
             2,
-            sides=((0,), (1,)),
-            edges=((0, 1),),
             frames=((0, 1),),
             turned=(1, 0),
             simplices=((0, 1),),
@@ -108,8 +109,6 @@ KINDS = {
             "quad",
             2,
             4,
-            sides=((0, 1), (1, 2), (2, 3), (3, 0)),
-            edges=((0, 1), (1, 2), (2, 3), (3, 0)),
             frames=((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)),
             turned=(0, 3, 2, 1),
             simplices=((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3)),
