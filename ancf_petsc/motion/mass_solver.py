@@ -34,18 +34,18 @@ class Factors(NamedTuple):
 
 
 class MassSolver:
-    """Solves M a = b on the free degrees of freedom; driven ones get 0. way: cholesky, chebyshev; None chooses.
+    """Solves M a = b on the free degrees of freedom; driven ones get 0. method: cholesky, chebyshev; None chooses.
 
     is_factored: whether there are `factors`.
     """
 
-    def __init__(self, mass: Mass, way: str | None = None) -> None:
+    def __init__(self, mass: Mass, method: str | None = None) -> None:
         self.mass = mass
         model = mass.assembly.model
         self.free = model.drive[: model.owned] < 0
         self._starts = envelope(*mass.assembly.graph) if mass.comm.size == 1 else np.zeros(1, np.int64)
-        way = way or self._choose()
-        self.is_factored = mass.lumped or way == "cholesky"
+        method = method or self._choose()
+        self.is_factored = mass.lumped or method == "cholesky"
         root = sqrt(mass.bounds[1] / mass.bounds[0])
         self._iterations = 1 if mass.lumped else ceil(log(ACCURACY / 2) / log((root - 1) / (root + 1)))
         self._factors = self._factor() if self.is_factored else None
