@@ -24,7 +24,7 @@ from ancf_petsc.analysis.build import build
 from ancf_petsc.element import catalog
 from ancf_petsc.element.element import Element
 from ancf_petsc.errors import CaseError
-from ancf_petsc.input import load, loads, messages, methods, schema
+from ancf_petsc.input import analysis, load, loads, messages, methods, schema
 from ancf_petsc.material import models
 from ancf_petsc.mesh.generate import make_mesh
 from ancf_petsc.plan import loads as plan_loads
@@ -217,6 +217,24 @@ def test_an_integrator_is_a_file_and_a_line(project, monkeypatch, tmp_path):
         heights.append(run(case, tmp_path / str(steps)).probes["tip.z"][-1])
     first, second = np.diff(heights)
     assert first / second == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_key_of_an_integrator_s_own_is_in_its_line(project, monkeypatch):
+    option = methods.Option("blend", "a number in [0, 1]; such as 0.5", 0.5, 0, 1)
+    row = methods.Method("midpoint", "midpoint.Midpoint", option=option)
+    monkeypatch.setitem(methods.METHODS, "midpoint", row)
+    dynamics = create_model("Dynamics", __base__=schema.DynamicsSpec, **analysis.own_keys())
+    change_cases(monkeypatch, dynamics=(dynamics, None))
+    case = load_case(project / "cases/pendulum")
+    asked = {"integrator": "midpoint", "duration": 0.5, "step": 0.01}
+    assert case.with_changes({"dynamics": asked}).spec.dynamics.option == 0.5
+    assert case.with_changes({"dynamics": {**asked, "blend": 0.75}}).spec.dynamics.option == 0.75
+    with pytest.raises(
+        CaseError, match=r"dynamics\.blend: found 2.0, expected a number in \[0, 1\]; such as"
+    ):
+        case.with_changes({"dynamics": {**asked, "blend": 2.0}})
+    with pytest.raises(CaseError, match='blend: theta does not read it.*integrator = "midpoint" with it'):
+        case.with_changes({"dynamics": {**asked, "integrator": "theta", "blend": 0.75}})
 
 
 def test_a_verb_is_a_file_and_a_line(project, monkeypatch, capsys):

@@ -57,7 +57,7 @@ class CriticalMode(Table):
     critical: int = key("a whole number >= 1", ge=1)
 
 
-def _own_keys() -> dict[str, Any]:
+def own_keys() -> dict[str, Any]:
     """The keys that are one integrator's own: whole numbers where the default is one."""
     options = [row.option for row in METHODS.values() if row.option]
     return {
@@ -66,7 +66,7 @@ def _own_keys() -> dict[str, Any]:
     }
 
 
-OwnKeys = create_model("OwnKeys", __base__=Table, **_own_keys())
+OwnKeys = create_model("OwnKeys", __base__=Table, **own_keys())
 
 
 class DynamicsSpec(OwnKeys):  # type: ignore[misc, valid-type]
