@@ -68,7 +68,7 @@ def test_a_node_the_file_does_not_hold_is_an_error():
 
 def test_all_negative_cells_are_turned_and_told():
     turned = tetrahedra(cells=[(0, 2, 1, 3), (2, 1, 3, 4)])
-    assert turned.notes == ["all 2 elements were negatively oriented: turned"]
+    assert turned.notes == ["all 2 elements were inverted: order of their nodes reversed"]
     assert (determinants(turned.points, turned.cells, KINDS["tetra"]) > 0).all()
 
 

@@ -214,8 +214,8 @@ def _orient(mesh: Mesh, kind: Kind, path: Path) -> None:
     if (worst > FLAT).all():
         return
     if (best < -FLAT).all():
-        mesh.cells = mesh.cells[:, kind.turned]
-        mesh.notes.append(f"all {len(mesh.cells)} elements were negatively oriented: turned")
+        mesh.cells = mesh.cells[:, kind.mirrored]
+        mesh.notes.append(f"all {len(mesh.cells)} elements were inverted: order of their nodes reversed")
         return
     negative = best < -FLAT
     if 2 * np.count_nonzero(negative) > len(negative):

@@ -23,7 +23,7 @@ class Kind:
     nodes: how many a cell has; the first `corners` of them are its corners.
     linear: the kind of its corners alone.
     frames: a corner and its neighbours, right-handed: their determinants are positive in a good cell.
-    turned: the order of nodes that mirrors the cell.
+    mirrored: the order of nodes that mirrors the cell.
     simplices, fold: simplices that cover the cell `fold` times (both diagonals of every quadrilateral).
     gmsh: Gmsh's number of the kind; gmsh_order: its nodes in our order, where that differs.
     """
@@ -33,7 +33,7 @@ class Kind:
     nodes: int
     linear: str = ""
     frames: Corners = ()
-    turned: tuple[int, ...] = ()
+    mirrored: tuple[int, ...] = ()
     simplices: Corners = ()
     fold: int = 1
     gmsh: int = 0
@@ -99,36 +99,36 @@ KINDS = {
             1,
             2,
             frames=((0, 1),),
-            turned=(1, 0),
+            mirrored=(1, 0),
             simplices=((0, 1),),
             gmsh=1,
             ideal=np.eye(1),
         ),
-        Kind("triangle", nodes=3, turned=(0, 2, 1), gmsh=2, **_TRIANGLE),
+        Kind("triangle", nodes=3, mirrored=(0, 2, 1), gmsh=2, **_TRIANGLE),
         Kind(
             "quad",
             2,
             4,
             frames=((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)),
-            turned=(0, 3, 2, 1),
+            mirrored=(0, 3, 2, 1),
             simplices=((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3)),
             fold=2,
             gmsh=3,
             ideal=np.eye(2),
         ),
-        Kind("tetra", nodes=4, turned=(0, 2, 1, 3), gmsh=4, **_TETRA),
-        Kind("hexahedron", nodes=8, turned=(0, 3, 2, 1, 4, 7, 6, 5), gmsh=5, **_HEXAHEDRON),
+        Kind("tetra", nodes=4, mirrored=(0, 2, 1, 3), gmsh=4, **_TETRA),
+        Kind("hexahedron", nodes=8, mirrored=(0, 3, 2, 1, 4, 7, 6, 5), gmsh=5, **_HEXAHEDRON),
         Kind("wedge", 3, 6, gmsh=6),
         Kind("pyramid", 3, 5, gmsh=7),
         Kind("line3", 1, 3, linear="line", gmsh=8),
-        Kind("triangle6", nodes=6, linear="triangle", turned=(0, 2, 1, 5, 4, 3), gmsh=9, **_TRIANGLE),
+        Kind("triangle6", nodes=6, linear="triangle", mirrored=(0, 2, 1, 5, 4, 3), gmsh=9, **_TRIANGLE),
         Kind("quad8", 2, 8, linear="quad", gmsh=16),
         Kind("quad9", 2, 9, linear="quad", gmsh=10),
         Kind(
             "tetra10",
             nodes=10,
             linear="tetra",
-            turned=(0, 2, 1, 3, 6, 5, 4, 7, 9, 8),
+            mirrored=(0, 2, 1, 3, 6, 5, 4, 7, 9, 8),
             gmsh=11,
             gmsh_order=(0, 1, 2, 3, 4, 5, 6, 7, 9, 8),
             **_TETRA,
@@ -137,7 +137,7 @@ KINDS = {
             "hexahedron20",
             nodes=20,
             linear="hexahedron",
-            turned=(0, 3, 2, 1, 4, 7, 6, 5, 11, 10, 9, 8, 15, 14, 13, 12, 16, 19, 18, 17),
+            mirrored=(0, 3, 2, 1, 4, 7, 6, 5, 11, 10, 9, 8, 15, 14, 13, 12, 16, 19, 18, 17),
             gmsh=17,
             gmsh_order=(*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15),
             **_HEXAHEDRON,

@@ -36,9 +36,9 @@ def on_root(comm: MPI.Comm, work: Callable[[], T]) -> T | None:
         except Exception as error:  # every rank has to hear of it, whatever it is
             failure = _portable(error)
             failure.__traceback__ = error.__traceback__
-    told = comm.bcast(failure, root=0) if comm.size > 1 else failure
-    if told is not None:
-        raise failure or told
+    known = comm.bcast(failure, root=0) if comm.size > 1 else failure
+    if known is not None:
+        raise failure or known
     return result
 
 

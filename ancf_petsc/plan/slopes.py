@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 FLAT = 1e-8
 """Eigenvalues of the sum of tangent projectors below this are zero: facets whose normals differ by less than 1e-4 are one plane."""
 ALIGNED, EXACT = 1e-8, 1e-12
-"""A direction is one of the frame when its cosine is this close to 1; a frame is turned when it is not as close as EXACT."""
+"""A direction is one of the frame when its cosine is this close to 1; a frame is rotated when it is not as close as EXACT."""
 
 Parts = dict[int, NDArray[np.int64]]
 
@@ -29,7 +29,7 @@ Parts = dict[int, NDArray[np.int64]]
 def prescribed_slopes(
     space: Space, supports: Iterable[tuple[set[int], Parts]]
 ) -> tuple[NDArray[np.bool_], int]:
-    """Turn the frames of `space` where needed. Returns (v, 3), whether a component of a slope is prescribed, and at how many
+    """Rotate the frames of `space` where needed. Returns (v, 3), whether a component of a slope is prescribed, and at how many
     nodes all slopes of a component are held for want of a frame.
 
     supports: components prescribed on parts (dimension -> corners (m, c), indices of points).
@@ -95,18 +95,18 @@ def _frames(space: Space, nodes: NDArray[np.int64], mark: Floats, marked: NDArra
     assert space.frames is not None
     default = space.frames[nodes]
     along = np.abs(np.einsum("kji,kcj->kci", default, mark)).max(axis=-1)
-    turned = (marked & (along < 1.0 - EXACT)).any(axis=1)
-    if not turned.any():
+    rotated = (marked & (along < 1.0 - EXACT)).any(axis=1)
+    if not rotated.any():
         return default
     # Distinct weights keep perpendicular marks apart, so that they are the eigenvectors of the sum.
-    weights = np.array([1.0, 2.0, 4.0]) * marked[turned]
-    total = np.einsum("kc,kci,kcj->kij", weights, mark[turned], mark[turned])
+    weights = np.array([1.0, 2.0, 4.0]) * marked[rotated]
+    total = np.einsum("kc,kci,kcj->kij", weights, mark[rotated], mark[rotated])
     if space.axes.shape[1] < 3:
-        normal = default[turned][:, :, -1]
+        normal = default[rotated][:, :, -1]
         total -= normal[:, :, None] * normal[:, None, :]
     _, frames = np.linalg.eigh(total)
     frames = frames[:, :, ::-1].copy()
     frames[np.linalg.det(frames) < 0, :, 1] *= -1.0
     result = default.copy()
-    result[turned] = frames
+    result[rotated] = frames
     return result
