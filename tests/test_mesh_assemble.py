@@ -85,7 +85,7 @@ def test_turning_a_cell_changes_the_sign_of_every_determinant(kind):
     if row.nodes > row.corners:
         points = np.concatenate([points, [points[list(edge)].mean(axis=0) for edge in row.edges]])
     cell = np.arange(row.nodes)[None]
-    turned = cell[:, row.turned]
+    turned = cell[:, row.mirrored]
     assert (determinants(points, cell, row) > 0).all()
     assert np.allclose(determinants(points, turned, row), -determinants(points, cell, row))
     if row.nodes > row.corners:
