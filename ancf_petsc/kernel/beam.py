@@ -1,11 +1,12 @@
 """Kernels of planar beams in absolute nodal coordinates: stretched along their axis and bent.
 
 With r' and r'' along the undeformed axis, A = r'.r', B = r'.r'', C = r''.r'':
-    w = E (A - 1)^2 / 8 + (E I / area) kappa^2 / 2,   kappa^2 = (A C - B^2) / A^3
-is the energy per volume, kappa the curvature of the axis. Parameters: E, E I / area. Arguments are those of `generic`.
+    w = E (A^(1/2) - 1)^2 / 2 + (E I / area) kappa^2 / 2,   kappa^2 = (A C - B^2) / A^2
+is the energy per volume; A^(1/2) is the stretch of the axis, kappa its rotation per undeformed length. Both belong to the
+Biot strain of plane sections, A^(1/2) - 1 - z kappa. Parameters: E, E I / area. Arguments are those of `generic`.
 
-Source: Berzeri and Shabana, Development of simple models for the elastic forces in the absolute nodal co-ordinate
-formulation, J. Sound Vib. 235 (2000) 539.
+Source: J. Gerstmayr, H. Irschik, On the correct representation of bending and axial deformation in the absolute nodal
+coordinate formulation with an elastic line approach, J. Sound Vib. 318 (2008) 461.
 """
 
 from __future__ import annotations
@@ -37,14 +38,15 @@ def strains(local, dN, inverse, r1, r2):
 
 @register_jitable
 def energy_of(A, B, C, p):
-    return p[0] * (A - 1.0) ** 2 / 8.0 + 0.5 * p[1] * (A * C - B * B) / A**3
+    return 0.5 * p[0] * (np.sqrt(A) - 1.0) ** 2 + 0.5 * p[1] * (A * C - B * B) / A**2
 
 
 @register_jitable
 def slopes_of(A, B, C, p):
     """dw/dA, dw/dB, dw/dC."""
     k = 0.5 * p[1]
-    return 0.25 * p[0] * (A - 1.0) + k * (3.0 * B * B / A**4 - 2.0 * C / A**3), -2.0 * k * B / A**3, k / A**2
+    axial = 0.5 * p[0] * (1.0 - 1.0 / np.sqrt(A))
+    return axial + k * (2.0 * B * B / A**3 - C / A**2), -2.0 * k * B / A**2, k / A
 
 
 @register_jitable
@@ -52,8 +54,8 @@ def hessian(A, B, C, p, r1, r2, H):
     """Second derivatives of w with respect to r' and r'' into H (2, 2, 3, 3)."""
     k = 0.5 * p[1]
     wA, wB, wC = slopes_of(A, B, C, p)
-    AA = 0.25 * p[0] + k * (6.0 * C / A**4 - 12.0 * B * B / A**5)
-    AB, AC, BB = 6.0 * k * B / A**4, -2.0 * k / A**3, -2.0 * k / A**3
+    AA = 0.25 * p[0] / A**1.5 + k * (2.0 * C / A**3 - 6.0 * B * B / A**4)
+    AB, AC, BB = 4.0 * k * B / A**3, -k / A**2, -2.0 * k / A**2
     for i in range(3):
         for j in range(3):
             same = 1.0 if i == j else 0.0
@@ -187,8 +189,8 @@ def tangent_product(positions, direction, cells, maps, volumes, reference, param
 
 @kernel
 def fields(positions, cells, maps, volumes, reference, parameters, first, last, strain, cauchy, det):
-    """Means over cells: Green-Lagrange strain along the axis as E_xx (e, 9), axial stress along the deformed axis (e, 9),
-    stretch of the axis (e,)."""
+    """Means over cells: Green-Lagrange strain along the axis as E_xx (e, 9), axial force over the undeformed section, along the
+    deformed axis (e, 9), stretch of the axis (e,)."""
     gradients, weights, slot, base = reference
     local, r1, r2 = np.empty((slot.size, 3)), np.empty(3), np.empty(3)
     for e in range(first, last):
@@ -196,12 +198,13 @@ def fields(positions, cells, maps, volumes, reference, parameters, first, last, 
         strain[e], cauchy[e], det[e] = 0.0, 0.0, 0.0
         for q in range(weights.size):
             A, B, C = strains(local, gradients[q], maps.inverses[e, 0, 0], r1, r2)
-            axial = 0.5 * (A - 1.0)
-            strain[e, 0] += weights[q] * axial
-            det[e] += weights[q] * np.sqrt(A)
+            stretch = np.sqrt(A)
+            strain[e, 0] += weights[q] * 0.5 * (A - 1.0)
+            det[e] += weights[q] * stretch
+            stress = parameters[0] * (stretch - 1.0)
             for i in range(3):
                 for j in range(3):
-                    cauchy[e, 3 * i + j] += weights[q] * parameters[0] * axial * r1[i] * r1[j] / A
+                    cauchy[e, 3 * i + j] += weights[q] * stress * r1[i] * r1[j] / A
 
 
 @cache

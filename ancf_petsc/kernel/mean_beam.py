@@ -1,9 +1,9 @@
 """Forces of planar beams between two states that keep energy and momenta; see `mean` and `beam`.
 
 With A, B, C as in `beam`, which are quadratic in r' and r'', and k = E I / (2 area), the energy per volume is
-    w = E (A - 1)^2 / 8 + k (C g - B^2 h),   g = A^-2, h = A^-3.
-The change of a product is the mean of one factor times the change of the other, and the changes of g and h are known
-multiples of that of A. This gives D_A, D_B, D_C with D_A dA + D_B dB + D_C dC = w1 - w0 exactly, the derivatives of w where
+    w = E (A^(1/2) - 1)^2 / 2 + k (C g - B^2 h),   g = A^-1, h = A^-2.
+The change of a product is the mean of one factor times the change of the other; the changes of g, h and the first term are
+known multiples of that of A, which is (s1 - s0) (s1 + s0) of the two stretches s. This gives D_A, D_B, D_C with D_A dA + D_B dB + D_C dC = w1 - w0 exactly, the derivatives of w where
 both states are one; with r' and r'' of the middle the force's work is the growth of the energy and its moments balance.
 """
 
@@ -25,13 +25,13 @@ from ancf_petsc.kernel.mean_generic import add_row
 def discrete_gradient(A0, B0, C0, A1, B1, C1, p):
     """D_A, D_B, D_C between two states; p as in `beam`."""
     k, product = 0.5 * p[1], A0 * A1
-    change_of_g = -(A0 + A1) / product**2
-    change_of_h = -(A0 * A0 + product + A1 * A1) / product**3
+    change_of_g = -1.0 / product
+    change_of_h = -(A0 + A1) / product**2
     bent = 0.5 * (C0 + C1) * change_of_g - 0.5 * (B0 * B0 + B1 * B1) * change_of_h
     return (
-        0.25 * p[0] * (0.5 * (A0 + A1) - 1.0) + k * bent,
-        -0.5 * k * (A0**-3 + A1**-3) * (B0 + B1),
-        0.5 * k * (A0**-2 + A1**-2),
+        0.5 * p[0] * (1.0 - 2.0 / (np.sqrt(A0) + np.sqrt(A1))) + k * bent,
+        -0.5 * k * (A0**-2 + A1**-2) * (B0 + B1),
+        0.5 * k * (1.0 / A0 + 1.0 / A1),
     )
 
 
@@ -39,17 +39,17 @@ def discrete_gradient(A0, B0, C0, A1, B1, C1, p):
 def discrete_hessian(A0, B0, C0, A1, B1, C1, p, D):
     """Derivatives of D_A, D_B, D_C with respect to A1, B1, C1 into D (3, 3)."""
     k, product = 0.5 * p[1], A0 * A1
-    squares = 0.5 * (B0 * B0 + B1 * B1)
+    squares, s1 = 0.5 * (B0 * B0 + B1 * B1), np.sqrt(A1)
     D[0, 0] = (
-        0.125 * p[0]
-        + 0.5 * k * (C0 + C1) * (2.0 / A1 + 1.0 / A0) / (product * A1)
-        - k * squares * (3.0 / A1**2 + 2.0 / product + 1.0 / A0**2) / (product * A1)
+        0.5 * p[0] / (s1 * (np.sqrt(A0) + s1) ** 2)
+        + 0.5 * k * (C0 + C1) / (product * A1)
+        - k * squares * (2.0 / A1 + 1.0 / A0) / (product * A1)
     )
-    D[0, 1] = k * B1 * (A0 * A0 + product + A1 * A1) / product**3
-    D[0, 2] = -0.5 * k * (A0 + A1) / product**2
-    D[1, 0] = 1.5 * k * (B0 + B1) / A1**4
-    D[1, 1] = -0.5 * k * (A0**-3 + A1**-3)
-    D[2, 0] = -k / A1**3
+    D[0, 1] = k * B1 * (A0 + A1) / product**2
+    D[0, 2] = -0.5 * k / product
+    D[1, 0] = k * (B0 + B1) / A1**3
+    D[1, 1] = -0.5 * k * (A0**-2 + A1**-2)
+    D[2, 0] = -0.5 * k / A1**2
     D[1, 2] = D[2, 1] = D[2, 2] = 0.0
 
 
