@@ -8,7 +8,8 @@ import pytest
 from ancf_petsc.algebra.graph import block_starts, neighbours
 from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.element.cell import CELLS
-from ancf_petsc.kernel import generic
+from ancf_petsc.kernel import point_solid
+from ancf_petsc.kernel.interface import Span, Target
 from ancf_petsc.kernel.tables import make_tables, turn_functions
 from ancf_petsc.material import LAWS
 from ancf_petsc.model.mass import mean_products
@@ -82,8 +83,8 @@ def program():
 
 def test_mass_is_that_of_the_derivation(program):
     row, tables, _ = program
-    half = np.stack([turn_functions(m, tables.maps.jacobians, row)[0] for m in mean_products(row)], axis=0)
-    mass = DENSITY * np.stack([turn_functions(m, tables.maps.jacobians, row)[0] for m in half.T], axis=1)
+    half = np.stack([turn_functions(m, tables.jacobians, row)[0] for m in mean_products(row)], axis=0)
+    mass = DENSITY * np.stack([turn_functions(m, tables.jacobians, row)[0] for m in half.T], axis=1)
     wanted = DENSITY * np.einsum("g,ga,gb->ab", WEIGHTS, VALUES, VALUES)
     np.testing.assert_allclose(mass, wanted, rtol=0, atol=1e-12 * wanted.max())
     assert mass[::4, ::4].sum() == pytest.approx(DENSITY, rel=1e-13)
@@ -92,16 +93,17 @@ def test_mass_is_that_of_the_derivation(program):
 @pytest.mark.parametrize("name", ["rest", "sheared", "bent"])
 def test_forces_and_tangent_are_those_of_the_derivation(program, name):
     row, tables, p = program
-    q, kernels = np.ascontiguousarray(state(name)), generic.make_kernels(LAWS["svk"])
+    q, kernels = np.ascontiguousarray(state(name)), point_solid.make_kernels(LAWS["svk"])
     found = np.zeros((32, 3))
-    kernels.internal_force(q, *tables, p, 0, 1, found)
+    kernels.internal_force((q,), tables, p, Span(0, 1), found)
     # Rounding of F^T F - I, 1e-15, times the stiffness.
     np.testing.assert_allclose(found, force(q), rtol=0, atol=1e-14 * YOUNG)
-    pointers, columns = neighbours(tables.cells, 32, 32)
+    pointers, columns = neighbours(tables.nodes, 32, 32)
     none = np.zeros(33, np.int64)
-    starts = block_starts(tables.cells, 32, pointers, columns, none, np.zeros(0, np.int32), 3)
+    starts = block_starts(tables.nodes, 32, pointers, columns, none, np.zeros(0, np.int32), 3)
     strides = np.stack((np.full(32, 96, np.int32), np.zeros(32, np.int32)), axis=1)
     values = np.zeros(96 * 96)
-    kernels.tangent(q, *tables, p, 0, 1, starts, strides, len(values), np.zeros(32, np.uint8), values)
+    target = Target(starts, strides, len(values), np.zeros(32, np.uint8), values)
+    kernels.tangent((q,), tables, p, Span(0, 1), target)
     wanted = tangent(q).reshape(96, 96)
     np.testing.assert_allclose(values.reshape(96, 96), wanted, rtol=0, atol=1e-13 * np.abs(wanted).max())

@@ -73,9 +73,9 @@ class Manufactured:
             len(corners), -1, row.cell.dimension, 3
         )
         tables = make_tables(row, model.cells, corners, directions=slopes, quadrature="exact")
-        _, self.maps, self.volumes, reference = tables
-        self.weights, self.row, self.model = reference.weights, row, model
-        self.shape = np.stack([self._turn(g) for g in np.moveaxis(reference.gradients, 2, 0)], axis=-1)
+        self.cells, self.volumes = tables, tables.volumes
+        self.weights, self.row, self.model = tables.fractions, row, model
+        self.shape = np.stack([self._turn(g) for g in np.moveaxis(tables.gradients, 2, 0)], axis=-1)
         xi = row.rule("exact").points
         linear = ELEMENTS[{"tetra": "3413", "hexahedron": "3813", "quad": "2412"}[row.cell_name]].values(xi)
         self.places = np.einsum("qc,eci->eqi", linear, corners)
@@ -88,7 +88,7 @@ class Manufactured:
         return np.einsum("e,q,eq->", self.volumes, self.weights, density)
 
     def gradients(self):
-        return np.einsum("eqak,ekj->eqaj", self.shape, self.maps.inverses)
+        return np.einsum("eqak,ekj->eqaj", self.shape, self.cells.inverses)
 
     def error(self):
         """Twice the energy of the error, by the identity as stiffness."""

@@ -6,12 +6,14 @@ from element_cells import CODES, EPS, SHAPES, corners_of, functions_at, rotation
 
 from ancf_petsc.algebra.graph import block_starts, neighbours
 from ancf_petsc.element.catalog import ELEMENTS
-from ancf_petsc.kernel import generic, tet3413
+from ancf_petsc.kernel import point_solid, tet3413
+from ancf_petsc.kernel.interface import Means, Span, Target
 from ancf_petsc.kernel.tables import make_tables
 from ancf_petsc.material import LAWS
 
 KERNEL_CODES = tuple(code for code in CODES if ELEMENTS[code].components == ELEMENTS[code].cell.dimension)
 SOLIDS = tuple(code for code in KERNEL_CODES if ELEMENTS[code].components == 3)
+ONE = Span(0, 1)
 each_element = pytest.mark.parametrize("code", KERNEL_CODES)
 each_shape = pytest.mark.parametrize("shape", SHAPES)
 each_law = pytest.mark.parametrize("law", LAWS.values(), ids=list(LAWS))
@@ -21,7 +23,7 @@ class OneCell:
     """One deformed cell of an element, with everything the kernels take."""
 
     def __init__(self, code, law, shape="random 0", *, quadrature="default", amplitude=0.01):
-        self.element, self.kernels = ELEMENTS[code], generic.make_kernels(law)
+        self.element, self.kernels = ELEMENTS[code], point_solid.make_kernels(law)
         self.parameters = law.parameters(1.0, 0.3)
         n = self.element.functions
         corners = corners_of(self.element.cell, shape)
@@ -55,34 +57,37 @@ class OneCell:
         return moves
 
     def energy(self, positions):
-        return self.kernels.energy(positions, *self.tables, self.parameters, 0, 1)
+        return self.kernels.energy((positions,), self.tables, self.parameters, ONE)
 
     def force(self, positions):
         force = np.zeros_like(positions)
-        self.kernels.internal_force(positions, *self.tables, self.parameters, 0, 1, force)
+        self.kernels.internal_force((positions,), self.tables, self.parameters, ONE, force)
         return force
 
     def product(self, positions, direction):
         force = np.zeros_like(positions)
-        self.kernels.tangent_product(positions, direction, *self.tables, self.parameters, 0, 1, force)
+        self.kernels.tangent_product((positions, direction), self.tables, self.parameters, ONE, force)
         return force
 
     def tangent(self, positions, driven=None):
         return assembled(self.kernels, positions, self.tables, self.parameters, driven)
 
 
-def assembled(kernels, positions, tables, parameters, driven=None):
-    """The tangent as a dense matrix (3 v, 3 v)."""
-    cells, v = tables[0], len(positions)
+def assembled(kernels, positions, tables, parameters, driven=None, *, later=None):
+    """The tangent as a dense matrix (3 v, 3 v); that between two states where there is a later one."""
+    cells, v = tables.nodes, len(positions)
     pointers, columns = neighbours(cells, v, v)
     starts = block_starts(cells, v, pointers, columns, np.zeros(v + 1, np.int64), np.zeros(0, np.int32), 3)
     strides = np.zeros((v, 2), np.int32)
     strides[:, 0] = 3 * np.diff(pointers)
     values = np.zeros(9 * len(columns))
     driven = np.zeros(v, np.uint8) if driven is None else driven
-    kernels.tangent(
-        positions, *tables, parameters, 0, len(cells), starts, strides, len(values), driven, values
-    )
+    target = Target(starts, strides, len(values), driven, values)
+    rest = (tables, parameters, Span(0, len(cells)), target)
+    if later is None:
+        kernels.tangent((positions,), *rest)
+    else:
+        kernels.mean_tangent((positions, later), *rest)
     dense = np.zeros((v, 3, v, 3))
     for i in range(v):
         near = columns[pointers[i] : pointers[i + 1]]
@@ -100,27 +105,28 @@ def two_tetrahedra():
 
 @each_law
 def test_fast_path_of_3413_equals_the_generic_kernels(law):
-    """Forces, energy, tangent with driven degrees of freedom, its product, fields and the smallest det F."""
+    """Forces, energy, tangent with driven degrees of freedom, its product, fields, the smallest det F, what is between states."""
     points, cells, positions = two_tetrahedra()
-    gradients, volumes = np.empty((2, 3, 3)), np.empty(2)
-    tet3413.geometry(points, cells, gradients, volumes)
-    fast, general = tet3413.make_kernels(law), generic.make_kernels(law)
+    fast, general = tet3413.make_kernels(law), point_solid.make_kernels(law)
     p = law.parameters(1.0, 0.3)
     driven = np.array([0, 0b101, 0, 0b111, 0], np.uint8)
     direction = np.random.default_rng(1).normal(size=positions.shape)
     answers = []
     for kernels, tables in (
-        (fast, (cells, gradients, volumes)),
+        (fast, tet3413.tetrahedra(cells, points)),
         (general, make_tables(ELEMENTS["3413"], cells, points[cells])),
     ):
         force, product = np.zeros_like(positions), np.zeros_like(positions)
-        strain, cauchy, det = np.empty((2, 9)), np.empty((2, 9)), np.empty(2)
-        smallest = kernels.internal_force(positions, *tables, p, 0, 2, force)
-        kernels.tangent_product(positions, direction, *tables, p, 0, 2, product)
-        kernels.fields(positions, *tables, p, 0, 2, strain, cauchy, det)
-        energy = kernels.energy(positions, *tables, p, 0, 2)
+        means, rest = Means(np.empty((2, 9)), np.empty((2, 9)), np.empty(2)), (tables, p, Span(0, 2))
+        smallest = kernels.internal_force((positions,), *rest, force)
+        kernels.tangent_product((positions, direction), *rest, product)
+        kernels.fields((positions,), *rest, means)
+        energy = kernels.energy((positions,), *rest)
+        later, between = positions + 0.02 * direction, np.zeros_like(positions)
+        kernels.mean_force((positions, later), *rest, between)
         K = assembled(kernels, positions, tables, p, driven)
-        answers.append((force, product, strain, cauchy, det, K, np.array([smallest, energy])))
+        mean_K = assembled(kernels, positions, tables, p, driven, later=later)
+        answers.append((force, product, *means, K, between, mean_K, np.array([smallest, energy])))
     for one, other in zip(*answers, strict=True):
         # Coordinates of 20 sizes of a cell: their differences carry 20 eps.
         np.testing.assert_allclose(one, other, rtol=0, atol=200 * EPS * abs(one).max())
@@ -237,8 +243,8 @@ def test_thickness_and_plane_stress():
     lame, mu = LAWS["svk"].parameters(1.0, 0.3)
     parameters = np.array([2 * lame * mu / (lame + 2 * mu), mu])
     strain, force = 1e-6, np.zeros((4, 3))
-    generic.make_kernels(LAWS["svk"]).internal_force(
-        points * [1 + strain, 1 - 0.3 * strain, 1], *tables, parameters, 0, 1, force
+    point_solid.make_kernels(LAWS["svk"]).internal_force(
+        (points * [1 + strain, 1 - 0.3 * strain, 1],), tables, parameters, ONE, force
     )
     expected = 0.1 * strain / 2 * np.sign(points) * [1, 0, 0]
     # Green and Lagrange's strain differs from the linear one by its square.
@@ -250,5 +256,5 @@ def test_inverted_points_are_seen():
     cell = OneCell("3843", LAWS["neo_hooke"], "right-corner", amplitude=0.0)
     cell.positions[0] += 2.0
     force = np.zeros_like(cell.positions)
-    assert cell.kernels.internal_force(cell.positions, *cell.tables, cell.parameters, 0, 1, force) < 0
+    assert cell.kernels.internal_force((cell.positions,), cell.tables, cell.parameters, ONE, force) < 0
     assert np.isinf(cell.energy(cell.positions))

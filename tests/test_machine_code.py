@@ -127,12 +127,12 @@ def test_the_digest_follows_code_that_is_called(monkeypatch):
 
 def test_the_digest_is_the_same_for_code_just_compiled_and_code_from_a_file(project, tmp_path):
     program = (
-        "from ancf_petsc.jit import digest\nfrom ancf_petsc.kernel.choice import way_of\n"
+        "from ancf_petsc.jit import digest\nfrom ancf_petsc.kernel.choice import kernel_set\n"
         "from ancf_petsc.element.catalog import element\nfrom ancf_petsc.material.models import LAWS\n"
         "from numba.core.serialize import dumps\nimport hashlib\n"
-        "for k in way_of(element('3843')).kernels(LAWS['svk']):\n"
-        "    cells = tuple(c.cell_contents for c in k.py_func.__closure__)\n"
-        "    print(k.py_func.__qualname__, hashlib.sha256(dumps(cells)).hexdigest())\n"
+        "for k in kernel_set(element('3843')).kernels(LAWS['svk']):\n"
+        "    cells = tuple(c.cell_contents for c in k.loop.py_func.__closure__)\n"
+        "    print(k.loop.py_func.__qualname__, hashlib.sha256(dumps(cells)).hexdigest())\n"
     )
     command = [sys.executable, "-X", f"pycache_prefix={tmp_path}", "-c", program]
     said = {subprocess.run(command, cwd=project, capture_output=True, check=True).stdout for _ in range(2)}
@@ -158,14 +158,12 @@ def test_the_check_of_info_finds_machine_code_of_another_law(code, monkeypatch, 
         for call in true_calls(row, law, **flags):
             yield (
                 call._replace(kernel=Impostor(call.kernel, other.kernel))
-                if law is laws[1] and call.kernel.py_func.__name__ == "internal_force"
+                if law is laws[1] and call.kernel.py_func.__name__ == "force_at"
                 else call
             )
 
     monkeypatch.setattr(selfcheck, "law_calls", with_foreign_energy)
-    assert [name.partition("[")[0] for name in selfcheck.wrong_kernels(element(code), laws)] == [
-        "internal_force"
-    ]
+    assert [name.partition("[")[0] for name in selfcheck.wrong_kernels(element(code), laws)] == ["force_at"]
 
 
 class Impostor:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ancf_petsc.analysis.file_order import FileOrder, file_order
 from ancf_petsc.element.catalog import element
 from ancf_petsc.input.load import Case
-from ancf_petsc.kernel.choice import way_of
+from ancf_petsc.kernel.choice import kernel_set
 from ancf_petsc.model.body import Body
 from ancf_petsc.model.load import Load
 from ancf_petsc.model.model import Model
@@ -80,7 +80,7 @@ def _make_body(case: Case, root: FromRoot[Plan]) -> Body:
     axes, section = root.value(lambda plan: plan.space.axes), spec.section
     tables = agree(
         comm,
-        lambda: way_of(row).tables(
+        lambda: kernel_set(row).cells(
             row,
             numbering.cells,
             reference,

@@ -16,7 +16,8 @@ from mpi4py import MPI
 from ancf_petsc.algebra.graph import block_starts, neighbours
 from ancf_petsc.bench.yardstick import timed
 from ancf_petsc.element.catalog import element
-from ancf_petsc.kernel.choice import way_of
+from ancf_petsc.kernel.choice import kernel_set
+from ancf_petsc.kernel.interface import Span, Target
 from ancf_petsc.kernel.samples import one_cell
 from ancf_petsc.material.models import LAWS
 
@@ -72,7 +73,7 @@ class _Cells:
 
     def __init__(self, code: str, law: str) -> None:
         row, chosen = element(code), LAWS[law]
-        way, n, d = way_of(row), row.functions, row.cell.dimension
+        chosen_set, n, d = kernel_set(row), row.functions, row.cell.dimension
         self.functions, self.points = n, row.points["default"]
         self.count = max(1, ENOUGH_POINTS // self.points)
         v = self.count * n
@@ -82,27 +83,27 @@ class _Cells:
         self.x, self.direction = reference.copy(), np.zeros((v, 3))
         self.x[:, :d] += AMPLITUDE * random.normal(size=(v, d))
         self.direction[:, :d] = random.normal(size=(v, d))
-        self.kernels = way.kernels(chosen)
-        tables = way.tables(row, cells, reference, axes=np.eye(3)[:, :d])
-        self.arguments = (*tables, chosen.parameters(1.0, 0.3), 0, self.count)
+        self.kernels = chosen_set.kernels(chosen)
+        tables = chosen_set.cells(row, cells, reference, axes=np.eye(3)[:, :d])
+        self.arguments = (tables, chosen.parameters(1.0, 0.3), Span(0, self.count))
         pointers, columns = neighbours(cells, v, v)
         starts = block_starts(cells, v, pointers, columns, pointers, columns, 3)
         self.values, self.result = np.zeros(9 * len(columns)), np.zeros((v, 3))
         strides = np.full((v, 2), 3 * n, np.int32)
-        self.matrix = (starts, strides, len(self.values), np.zeros(v, np.uint8), self.values)
+        self.matrix = Target(starts, strides, len(self.values), np.zeros(v, np.uint8), self.values)
 
     def force(self) -> None:
-        self.kernels.internal_force(self.x, *self.arguments, self.result)
+        self.kernels.internal_force((self.x,), *self.arguments, self.result)
 
     def tangent(self) -> None:
-        self.kernels.tangent(self.x, *self.arguments, *self.matrix)
+        self.kernels.tangent((self.x,), *self.arguments, self.matrix)
 
     def force_error(self) -> float:
         self.result[:] = 0.0
         self.force()
         found = float(np.sum(self.result * self.direction))
         ahead, behind = (
-            self.kernels.energy(self.x + h * self.direction, *self.arguments) for h in (STEP, -STEP)
+            self.kernels.energy((self.x + h * self.direction,), *self.arguments) for h in (STEP, -STEP)
         )
         return abs((ahead - behind) / 2 / STEP - found) / float(abs(self.result * self.direction).sum())
 
@@ -112,6 +113,6 @@ class _Cells:
         self.tangent()
         blocks = self.values.reshape(self.count, n, 3, n, 3)
         found = np.einsum("eaibj,ebj->eai", blocks, self.direction.reshape(self.count, n, 3))
-        self.kernels.tangent_product(self.x, self.direction, *self.arguments, self.result)
+        self.kernels.tangent_product((self.x, self.direction), *self.arguments, self.result)
         wanted = self.result.reshape(found.shape)
         return float(abs(found - wanted).max() / abs(wanted).max())

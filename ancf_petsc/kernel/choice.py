@@ -1,4 +1,4 @@
-"""Which kernels compute an element: those of beams, those of any element, or a fast path that equals them."""
+"""Which kernels compute an element: those of beams, those of solids, or a fast path that equals them."""
 
 from __future__ import annotations
 
@@ -9,46 +9,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ancf_petsc.element.element import Element
-from ancf_petsc.kernel import beam, generic, mean, mean_beam, mean_generic, motion, tet3413
-from ancf_petsc.kernel.mean import MeanKernels
+from ancf_petsc.kernel import motion, point_beam, point_solid, tet3413
+from ancf_petsc.kernel.interface import Cells, Floats, Kernels
 from ancf_petsc.kernel.motion import MotionKernels
 from ancf_petsc.kernel.tables import make_tables, nodes_with_slopes
-from ancf_petsc.kernel.tet3413 import Kernels
 from ancf_petsc.material.models import Law
 
-Floats = NDArray[np.float64]
 
-
-class Way(NamedTuple):
-    """tables(element, cells (e, a), reference (v, 3), **of make_tables): what kernels take of the cells.
+class KernelSet(NamedTuple):
+    """cells(element, cells (e, a), reference (v, 3), **of make_tables): what kernels take of the cells.
 
     motion: loops over whole steps of a motion, where there are such.
     """
 
-    tables: Callable[..., tuple]
+    name: str
+    cells: Callable[..., tuple]
     kernels: Callable[[Law], Kernels]
-    mean_kernels: Callable[[Law], MeanKernels]
     motion: Callable[[Law], MotionKernels] | None = None
 
 
-def _generic_tables(element: Element, cells: NDArray[np.int32], reference: Floats, **more) -> tuple:
+def _any_cells(element: Element, cells: NDArray[np.int32], reference: Floats, **more) -> Cells:
     corners = reference[cells[:, np.flatnonzero(element.slot == 0)[: len(element.cell.corners)]]]
     s, d = nodes_with_slopes(element), element.cell.dimension
     slopes = reference[cells[:, np.flatnonzero(element.slot > 0)]].reshape(len(cells), s, d, 3)
     return make_tables(element, cells, corners, directions=slopes, **more)
 
 
-def _tables_3413(element: Element, cells: NDArray[np.int32], reference: Floats, **_: object) -> tuple:
-    gradients, volumes = np.empty((len(cells), 3, 3)), np.empty(len(cells))
-    tet3413.geometry(reference, cells, gradients, volumes)
-    return cells, gradients, volumes
+def _tetrahedra(
+    element: Element, cells: NDArray[np.int32], reference: Floats, **_: object
+) -> tet3413.Tetrahedra:
+    return tet3413.tetrahedra(cells, reference)
 
 
-ANY = Way(_generic_tables, generic.make_kernels, mean_generic.make_mean_kernels)
-BEAM = Way(_generic_tables, beam.make_kernels, mean_beam.make_mean_kernels)
-FAST = {"3413": Way(_tables_3413, tet3413.make_kernels, mean.make_mean_kernels, motion.make_motion_kernels)}
+SOLID = KernelSet("solid", _any_cells, point_solid.make_kernels)
+BEAM = KernelSet("beam", _any_cells, point_beam.make_kernels)
+FAST = {"3413": KernelSet("tet3413", _tetrahedra, tet3413.make_kernels, motion.make_motion_kernels)}
 
 
-def way_of(element: Element) -> Way:
-    """How an element is computed."""
-    return BEAM if element.is_beam else FAST.get(element.code, ANY)
+def kernel_set(element: Element) -> KernelSet:
+    """The kernels of an element."""
+    return BEAM if element.is_beam else FAST.get(element.code, SOLID)

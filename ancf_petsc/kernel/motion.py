@@ -2,7 +2,7 @@
 balance of an implicit step; `adaptive` and `implicit` have the steps that are made of them.
 
 For a body of one material on one rank, whose driven degrees of freedom rest: what a step costs is then its
-arithmetic, not the interpreter's. Arrays as in `tet3413`, with n nodal vectors:
+arithmetic, not the interpreter's. With n nodal vectors:
     x, v, a (n, 3)        positions, velocities, accelerations
     factors (m, l)        of the loads at m times, patterns (l, n, 3) of the loads
     starts (n+1,), factors (k, size), which (3,)  of the consistent mass (`envelope`): component c is solved
@@ -25,7 +25,10 @@ from ancf_petsc.algebra.envelope import solve_components
 from ancf_petsc.jit import composed, kernel
 from ancf_petsc.kernel.adaptive import leap_kernel
 from ancf_petsc.kernel.implicit import alpha_kernel
-from ancf_petsc.kernel.tet3413 import edge_sum, nodes_of, scatter_force
+from ancf_petsc.kernel.interface import Span
+from ancf_petsc.kernel.loop import loop
+from ancf_petsc.kernel.point_solid import force_action
+from ancf_petsc.kernel.tet3413 import GEOMETRY, SOLID, named_cells
 from ancf_petsc.material.models import Law
 
 
@@ -114,27 +117,25 @@ def kinetic_square(pointers, columns, values, v):
 @cache
 def make_motion_kernels(law: Law) -> MotionKernels:
     """Compiled loops for one law."""
-    balance = balance_of(law.stress)
+    balance = balance_of(loop(GEOMETRY, force_action(law, SOLID)))
     rates, unbalance = rates_of(balance), unbalance_of(balance)
     return MotionKernels(
         kernel(rates), march_kernel(balance), kernel(unbalance), leap_kernel(rates), alpha_kernel(unbalance)
     )
 
 
-def balance_of(stress: Callable) -> Callable:
+def balance_of(visit: Callable) -> Callable:
     """The loop over forces, to stand in others."""
 
     @composed
     def balance(x, body, factors, patterns, force):
         """force (n, 3): loads less internal forces."""
-        cells, gradients, volumes, parameters = body
+        cells, parameters = named_cells(body[0]), body[1]
         force[:] = 0.0
-        for e in range(cells.shape[0]):
-            nodes, G = nodes_of(cells, e), gradients[e]
-            scatter_force(force, nodes, stress(edge_sum(x, nodes, G), parameters), -volumes[e], G)
+        visit((x,), cells, parameters, Span(0, cells.volumes.size), force)
         for i in range(force.shape[0]):
             for c in range(3):
-                force[i, c] += load(factors, patterns, i, c)
+                force[i, c] = load(factors, patterns, i, c) - force[i, c]
 
     return balance
 

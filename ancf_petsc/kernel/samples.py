@@ -16,9 +16,10 @@ from ancf_petsc.algebra import blocks, coarse
 from ancf_petsc.algebra.envelope import envelope, factorise, solve_fields
 from ancf_petsc.algebra.graph import block_starts, neighbours
 from ancf_petsc.element.element import Element
-from ancf_petsc.kernel.choice import way_of
+from ancf_petsc.kernel.choice import kernel_set
 from ancf_petsc.kernel.constant import add_mass, add_mass_blocks, mass_product
 from ancf_petsc.kernel.implicit import Progress, Scheme, Test
+from ancf_petsc.kernel.interface import Means, Span, Target
 from ancf_petsc.kernel.motion import MotionKernels
 from ancf_petsc.kernel.tables import nodes_with_slopes
 from ancf_petsc.material.models import Law
@@ -58,21 +59,20 @@ def law_calls(element: Element, law: Law, *, mean: bool = False, moving: bool = 
     cells, reference = np.arange(n, dtype=np.int32).reshape(1, n), one_cell(element)
     before, after, force = deformed(reference, 1), deformed(reference, 2), np.zeros((n, 3))
     graph, matrix = _matrix(cells)
-    way = way_of(element)
-    tables = way.tables(element, cells, reference, axes=np.eye(3)[:, :d])
-    kernels, p = way.kernels(law), law.parameters(1.0, 0.3)
-    yield Call(kernels.internal_force, (before, *tables, p, 0, 1, force))
-    yield Call(kernels.energy, (before, *tables, p, 0, 1))
-    yield Call(kernels.tangent, (before, *tables, p, 0, 1, *matrix))
-    yield Call(kernels.tangent_product, (before, after, *tables, p, 0, 1, force))
-    fields = (np.empty((1, 9)), np.empty((1, 9)), np.empty(1))
-    yield Call(kernels.fields, (before, *tables, p, 0, 1, *fields))
-    if mean and law.mean_stress is not None:
-        between = way.mean_kernels(law)
-        yield Call(between.force, (before, after, *tables, p, 0, 1, force))
-        yield Call(between.tangent, (before, after, *tables, p, 0, 1, *matrix))
-    if moving and way.motion is not None:
-        yield from _motion_calls(way.motion(law), (*tables, p), before, graph)
+    chosen = kernel_set(element)
+    tables = chosen.cells(element, cells, reference, axes=np.eye(3)[:, :d])
+    kernels, p = chosen.kernels(law), law.parameters(1.0, 0.3)
+    rest = (tables, p, Span(0, 1))
+    yield Call(kernels.internal_force, ((before,), *rest, force))
+    yield Call(kernels.energy, ((before,), *rest))
+    yield Call(kernels.tangent, ((before,), *rest, matrix))
+    yield Call(kernels.tangent_product, ((before, after), *rest, force))
+    yield Call(kernels.fields, ((before,), *rest, Means(np.empty((1, 9)), np.empty((1, 9)), np.empty(1))))
+    if mean and kernels.mean_force is not None and kernels.mean_tangent is not None:
+        yield Call(kernels.mean_force, ((before, after), *rest, force))
+        yield Call(kernels.mean_tangent, ((before, after), *rest, matrix))
+    if moving and chosen.motion is not None:
+        yield from _motion_calls(chosen.motion(law), (tuple(tables), p), before, graph)
 
 
 def common_calls(element: Element) -> Iterator[Call]:
@@ -84,13 +84,13 @@ def common_calls(element: Element) -> Iterator[Call]:
     yield from _block_calls(graph)
 
 
-def _matrix(cells: NDArray) -> tuple[tuple[NDArray, NDArray], tuple]:
-    """The graph of one cell's nodal vectors, and starts, strides, split, driven, values of its matrix."""
+def _matrix(cells: NDArray) -> tuple[tuple[NDArray, NDArray], Target]:
+    """The graph of one cell's nodal vectors, and its matrix as kernels take it."""
     n = cells.shape[1]
     pointers, columns = neighbours(cells, n, n)
     starts = block_starts(cells, n, pointers, columns, pointers, columns, 3)
     strides, driven, values = np.full((n, 2), 3 * n, np.int32), np.zeros(n, np.uint8), np.zeros(9 * n * n)
-    return (pointers, columns), (starts, strides, len(values), driven, values)
+    return (pointers, columns), Target(starts, strides, len(values), driven, values)
 
 
 def _mass_calls(element: Element, cells: NDArray, graph: tuple, matrix: tuple) -> Iterator[Call]:

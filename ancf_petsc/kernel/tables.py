@@ -1,4 +1,4 @@
-"""What the generic kernels take of the cells of one element.
+"""The cells of one element, as kernels take them.
 
 A nodal slope is the derivative of r along a direction, times a length: its undeformed value says which. J turns
 slopes into those of the reference cell, so that shape functions are the same numbers for all cells.
@@ -10,50 +10,11 @@ first Lame parameter. Volumes of beams have the area in them.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ancf_petsc.element.element import Element
-
-Floats = NDArray[np.float64]
-
-
-class Maps(NamedTuple):
-    """Affine maps X = X0 + J xi of cells, for kernels.
-
-    jacobians (e, s, 3, 3): of each node s with slopes, from its slopes j to those along xi_k.
-    inverses (e, 3, 3): dxi/dX; of a beam one over its length.
-    """
-
-    jacobians: Floats
-    inverses: Floats
-
-
-class Reference(NamedTuple):
-    """Shape functions a of the reference cell at quadrature points q.
-
-    gradients (q, a, 3): dN/dxi; of a beam the first and the second derivative. weights (q): fractions of the volume,
-    their sum is 1. slot (a): 0 for a position, j for the j-th slope. base (9,): what F has without nodal vectors.
-    """
-
-    gradients: Floats
-    weights: Floats
-    slot: NDArray[np.int32]
-    base: Floats
-
-
-class Tables(NamedTuple):
-    """The arguments that all kernels take of the cells, in their order.
-
-    cells (e, a): nodal vectors, node by node, a position before its slopes. volumes (e): undeformed volumes.
-    """
-
-    cells: NDArray[np.int32]
-    maps: Maps
-    volumes: Floats
-    reference: Reference
+from ancf_petsc.kernel.interface import Cells, Floats
 
 
 def make_tables(
@@ -66,8 +27,8 @@ def make_tables(
     quadrature: str = "default",
     thickness: float = 1.0,
     numbers: ArrayLike | None = None,
-) -> Tables:
-    """Tables of cells (e, a) from undeformed corners (e, c, 3).
+) -> Cells:
+    """Cells (e, a) from undeformed corners (e, c, 3).
 
     directions (e, s, d, 3): undeformed slopes of the nodes with slopes, default the axes. axes (3, d): those a plane body
     lies along, default x and y. thickness: of a plane body; the area of a beam. numbers (e): for messages.
@@ -84,11 +45,12 @@ def make_tables(
     if element.is_beam:
         inverses[:, 0, 0] = geometry.inverse[:, 0, 0]
     volume = float(element.cell.volume) * (1.0 if d == 3 else thickness)
-    return Tables(
+    return Cells(
         np.ascontiguousarray(cells, dtype=np.int32),
-        Maps(slope_maps(geometry.jacobian, frame, np.asarray(directions)), inverses),
+        slope_maps(geometry.jacobian, frame, np.asarray(directions)),
+        inverses,
         geometry.determinant * volume,
-        make_reference(element, quadrature, frame),
+        *reference_functions(element, quadrature, frame),
     )
 
 
@@ -118,8 +80,10 @@ def turn_functions(values: Floats, maps: Floats, element: Element) -> Floats:
     return turned
 
 
-def make_reference(element: Element, quadrature: str = "default", axes: ArrayLike | None = None) -> Reference:
-    """Shape functions of an element at the points of a named quadrature."""
+def reference_functions(
+    element: Element, quadrature: str = "default", axes: ArrayLike | None = None
+) -> tuple[Floats, Floats, NDArray[np.int32], Floats]:
+    """gradients, fractions, slot and base of `Cells`, at the points of a named quadrature."""
     tables = element.tables(quadrature)
     d = element.cell.dimension
     gradients = np.zeros((*tables.values.shape, 3))
@@ -128,4 +92,4 @@ def make_reference(element: Element, quadrature: str = "default", axes: ArrayLik
         gradients[..., 1] = element.derivative(tables.points, (2,))
     frame = np.eye(3)[:, :d] if axes is None else np.asarray(axes)
     base = (np.eye(3) - frame @ frame.T).ravel()
-    return Reference(gradients, tables.weights / tables.weights.sum(), tables.slot.astype(np.int32), base)
+    return gradients, tables.weights / tables.weights.sum(), tables.slot.astype(np.int32), base

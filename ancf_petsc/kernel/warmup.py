@@ -9,7 +9,7 @@ from pathlib import Path
 from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.element.element import Element
 from ancf_petsc.jit import CACHE_FOLDER, digest
-from ancf_petsc.kernel.choice import way_of
+from ancf_petsc.kernel.choice import kernel_set
 from ancf_petsc.kernel.samples import Call, common_calls, law_calls
 from ancf_petsc.material.models import LAWS, Law
 
@@ -34,7 +34,7 @@ def compile_kernels(
 
 def compiled_sets() -> Iterator[tuple[Element, list[Law], bool, bool]]:
     """What the cache holds: an element of each kind, the laws, whether kernels between two states and of motions are there."""
-    representatives = {way_of(element): element for element in reversed(ELEMENTS.values())}
+    representatives = {kernel_set(element): element for element in reversed(ELEMENTS.values())}
     for element in representatives.values():
         for mean in (False, True):
             for moving in (False, True):
@@ -55,7 +55,6 @@ def _make(calls: Iterable[Call]) -> None:
 
 
 def _mark(element: Element, law: Law, *, mean: bool, moving: bool) -> Path:
-    """The file that says: compiled. Elements computed the same way share their machine code."""
-    way = way_of(element).kernels.__module__.rpartition(".")[2]
-    name = f"{way}.{law.name}-{digest(law.tangent)}{'.mean' * mean}{'.motion' * moving}.compiled"
+    """The file that says: compiled. Elements of one kernel set share their machine code."""
+    name = f"{kernel_set(element).name}.{law.name}-{digest(law.tangent)}{'.mean' * mean}{'.motion' * moving}.compiled"
     return CACHE_FOLDER / name

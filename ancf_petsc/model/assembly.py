@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.algebra.graph import neighbours
+from ancf_petsc.kernel.interface import Means
 from ancf_petsc.model.matrix import Layout, Matrix
 from ancf_petsc.model.model import Model
 from ancf_petsc.parallel.exchange import combined
@@ -89,21 +90,21 @@ class Assembly:
         smallest = np.inf
         for region in self.model.regions:
             found = region.kernels.internal_force(
-                positions, *self.model.tables, region.parameters, region.first, region.last, force
+                (positions,), self.model.tables, region.parameters, region.cells, force
             )
             smallest = min(smallest, found)
         return force[: self.model.owned], smallest
 
     def mean_force(self, x0: PETSc.Vec, x1: PETSc.Vec) -> tuple[NDArray, float]:
         """Forces (n, 3) between two states whose work is exactly the growth of the energy, and the smallest det F1."""
-        before, after = self._two_states(x0, x1)
+        states = self._two_states(x0, x1)
         force = self._force
         force[:] = 0.0
         smallest = np.inf
         for region in self.model.regions:
-            assert region.mean_kernels is not None
-            found = region.mean_kernels.force(
-                before, after, *self.model.tables, region.parameters, region.first, region.last, force
+            assert region.kernels.mean_force is not None
+            found = region.kernels.mean_force(
+                states, self.model.tables, region.parameters, region.cells, force
             )
             smallest = min(smallest, found)
         return force[: self.model.owned], smallest
@@ -119,9 +120,7 @@ class Assembly:
         """Strain energy of the whole body."""
         positions = self.local(x)
         own = [
-            region.kernels.energy(
-                positions, *self.model.tables, region.parameters, region.first, region.own_last
-            )
+            region.kernels.energy((positions,), self.model.tables, region.parameters, region.own_cells)
             for region in self.model.regions
         ]
         return combined(self.comm, sum(own))
@@ -129,30 +128,19 @@ class Assembly:
     def tangent_product(self, x: PETSc.Vec, direction: PETSc.Vec) -> NDArray:
         """The tangent at x times a direction: (n, 3) on owned nodal vectors, driven rows and columns included."""
         positions = self.local(x)
-        along = self.local(direction, into=np.empty_like(positions))
+        fields = (positions, self.local(direction, into=np.empty_like(positions)))
         force = np.zeros_like(positions)
         for region in self.model.regions:
-            region.kernels.tangent_product(
-                positions, along, *self.model.tables, region.parameters, region.first, region.last, force
-            )
+            region.kernels.tangent_product(fields, self.model.tables, region.parameters, region.cells, force)
         return force[: self.model.owned]
 
-    def fields(self, x: PETSc.Vec) -> tuple[NDArray, NDArray, NDArray]:
+    def fields(self, x: PETSc.Vec) -> Means:
         """Green-Lagrange strain (e, 9), Cauchy stress (e, 9) and det F (e,) of this rank's cells."""
         positions, e = self.local(x), len(self.model.cells)
-        strain, cauchy, det = np.empty((e, 9)), np.empty((e, 9)), np.empty(e)
+        means = Means(np.empty((e, 9)), np.empty((e, 9)), np.empty(e))
         for region in self.model.regions:
-            region.kernels.fields(
-                positions,
-                *self.model.tables,
-                region.parameters,
-                region.first,
-                region.last,
-                strain,
-                cauchy,
-                det,
-            )
-        return strain, cauchy, det
+            region.kernels.fields((positions,), self.model.tables, region.parameters, region.cells, means)
+        return means
 
     # --- matrices
 
@@ -176,16 +164,17 @@ class Assembly:
         positions = self.local(x)
         for region in self.model.regions:
             region.kernels.tangent(
-                positions, *self.model.tables, region.parameters, region.first, region.last, *matrix.target
+                (positions,), self.model.tables, region.parameters, region.cells, matrix.target
             )
 
     def add_mean_tangent(self, x0: PETSc.Vec, x1: PETSc.Vec, matrix: Matrix) -> None:
         """Add the derivative of `mean_force` with respect to x1 to a matrix that is not finished yet. Collective."""
-        before, after = self._two_states(x0, x1)
+        states = self._two_states(x0, x1)
         for region in self.model.regions:
-            assert region.mean_kernels is not None
-            given = (*self.model.tables, region.parameters, region.first, region.last)
-            region.mean_kernels.tangent(before, after, *given, *matrix.target)
+            assert region.kernels.mean_tangent is not None
+            region.kernels.mean_tangent(
+                states, self.model.tables, region.parameters, region.cells, matrix.target
+            )
 
     # --- ghosts
 

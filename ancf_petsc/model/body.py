@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ancf_petsc.element.element import Element
-from ancf_petsc.kernel.mean import MeanKernels
+from ancf_petsc.kernel.interface import Kernels, Span
 from ancf_petsc.kernel.tables import turn_functions
-from ancf_petsc.kernel.tet3413 import Kernels
 from ancf_petsc.material import Law
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.parallel.numbering import Numbering
@@ -23,17 +23,26 @@ Floats = NDArray[np.float64]
 class Region:
     """Cells first:last of one material; those before own_last are owned by this rank.
 
-    kernels, mean_kernels: compiled loops for the element and the law; the latter keep energy, where there are such.
+    kernels: compiled loops for the element and the law.
     """
 
     law: Law
     kernels: Kernels
-    mean_kernels: MeanKernels | None
     parameters: Floats
     density: float | None
     first: int
     own_last: int
     last: int
+
+    @property
+    def cells(self) -> Span:
+        """All of them."""
+        return Span(self.first, self.last)
+
+    @property
+    def own_cells(self) -> Span:
+        """Those owned by this rank."""
+        return Span(self.first, self.own_last)
 
 
 @dataclass(frozen=True)
@@ -42,7 +51,7 @@ class Body:
 
     reference (v, 3): nodal vectors of the undeformed body. slots (v,): 0 for a position, j for the j-th slope of its node, which
     follows the position j places behind. Slopes are multiplied by lengths.
-    tables: arrays of the cells that every kernel takes; the first is cells (e, a), the third volumes (e,).
+    tables: the cells as every kernel takes them, see `kernel/choice`; they have nodes (e, a) and volumes (e,).
     size: diagonal of the box around the body. cell_numbers: (e,) number of each cell in the mesh file.
     """
 
@@ -51,7 +60,7 @@ class Body:
     numbering: Numbering
     reference: Floats
     slots: NDArray[np.int8]
-    tables: tuple
+    tables: Any
     regions: tuple[Region, ...]
     size: float
     cell_numbers: NDArray[np.int64]
@@ -69,12 +78,12 @@ class Body:
     @property
     def cells(self) -> NDArray[np.int32]:
         """(e, a) local nodal vectors of each cell."""
-        return self.tables[0]
+        return self.tables.nodes
 
     @property
     def volumes(self) -> Floats:
         """(e,) undeformed volumes."""
-        return self.tables[2]
+        return self.tables.volumes
 
     @property
     def dof(self) -> int:
@@ -93,7 +102,7 @@ class Body:
     @property
     def slope_maps(self) -> Floats:
         """(e, s, 3, 3) from the slopes of the nodes of each cell to those along xi; no s without slopes."""
-        return self.tables[1].jacobians if self.element.has_slopes else np.empty((len(self.cells), 0, 3, 3))
+        return self.tables.jacobians if self.element.has_slopes else np.empty((len(self.cells), 0, 3, 3))
 
     def position_cells(self) -> NDArray[np.int32]:
         """(e, k) the positions of the nodes of each cell."""

@@ -16,6 +16,7 @@ from petsc4py import PETSc
 
 from ancf_petsc.algebra.graph import block_starts
 from ancf_petsc.kernel.constant import add_mass_blocks
+from ancf_petsc.kernel.interface import Target
 from ancf_petsc.model.model import Model
 from ancf_petsc.parallel.exchange import combined
 
@@ -88,10 +89,10 @@ class Matrix:
             self.mat.setOption(PETSc.Mat.Option.SYMMETRY_ETERNAL, flag=True)
 
     @property
-    def target(self) -> tuple[NDArray, NDArray, int, NDArray, NDArray]:
+    def target(self) -> Target:
         """What a kernel takes to add to the matrix."""
         layout = self.layout
-        return layout.starts, layout.strides, layout.rows.split, layout.driven_bits, self.values
+        return Target(layout.starts, layout.strides, layout.rows.split, layout.driven_bits, self.values)
 
     def clear(self) -> None:
         """Begin anew: all numbers are zero."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ancf_petsc.kernel.choice import way_of
+from ancf_petsc.kernel.choice import kernel_set
 from ancf_petsc.kernel.implicit import Progress, Scheme, Test
 from ancf_petsc.motion.equations import Equations
 
@@ -32,7 +32,7 @@ def fused_motion(equations: Equations) -> FusedMotion | None:
     """For one rank, one material, an element with such kernels, nothing driven along, a mass that is factored; else None."""
     model = equations.assembly.model
     simple = equations.comm.size == 1 and len(model.regions) == 1 and not equations.is_driven
-    fits = simple and way_of(model.element).motion is not None and equations.solver.is_factored
+    fits = simple and kernel_set(model.element).motion is not None and equations.solver.is_factored
     return FusedMotion(equations) if fits else None
 
 
@@ -44,13 +44,13 @@ class FusedMotion:
 
     def __init__(self, equations: Equations) -> None:
         assembly, mass, model = equations.assembly, equations.mass, equations.assembly.model
-        kernels = way_of(model.element).motion
+        kernels = kernel_set(model.element).motion
         assert kernels is not None
-        region, (cells, gradients, volumes) = model.regions[0], model.tables
+        region = model.regions[0]
         self._kernels = kernels(region.law)
         self._damping, self._duration = equations.damping, equations.duration
         self._loads = model.loads
-        self._body = (cells, gradients, volumes, region.parameters)
+        self._body = (tuple(model.tables), region.parameters)
         n = model.owned
         self._patterns = np.array([load.pattern for load in model.loads]).reshape(-1, n, 3)
         self._mass = tuple(equations.solver.factors())
@@ -61,7 +61,7 @@ class FusedMotion:
         self._stages = (np.empty((7, 2, n, 3)), np.empty((2, n, 3)))
         self.steady = all(load.ramp.kind == "constant" for load in model.loads)
         self._now = self._factors(np.zeros(1))[0]
-        self.at_once = max(1, CELLS_AT_ONCE // max(1, len(cells)))
+        self.at_once = max(1, CELLS_AT_ONCE // max(1, len(model.cells)))
 
     def rates(self, t: float, y: NDArray, f: NDArray) -> None:
         """f = dy/dt of y = (x, v), flat, at time t."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ancf_petsc.element.element import Element
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input.schema import CaseSpec, MaterialSpec
-from ancf_petsc.kernel.choice import way_of
+from ancf_petsc.kernel.choice import kernel_set
 from ancf_petsc.material import Law, law_named
 from ancf_petsc.material.models import plane_stress
 from ancf_petsc.mesh.groups import cells_of
@@ -66,7 +66,7 @@ def regions(
     spec: CaseSpec, element: Element, material: NDArray[np.int64], own: NDArray[np.bool_]
 ) -> tuple[Region, ...]:
     """The regions of this rank's cells, which are sorted by material (e,) and, within one, own ones first: own (e,)."""
-    found, kernels = [], way_of(element)
+    found, kernels = [], kernel_set(element)
     for number, given in enumerate(spec.material):
         first, last = np.searchsorted(material, (number, number + 1))
         law = law_named(given.law)
@@ -74,7 +74,6 @@ def regions(
             Region(
                 law=law,
                 kernels=kernels.kernels(law),
-                mean_kernels=kernels.mean_kernels(law) if law.mean_stress else None,
                 parameters=_parameters(element, law, given, spec),
                 density=given.density,
                 first=int(first),

@@ -30,7 +30,7 @@ class EnergyMomentum(OneStep):
 
     def __init__(self, equations: Equations, settings: Settings, x: PETSc.Vec, v: PETSc.Vec) -> None:
         for region in equations.assembly.model.regions:
-            if region.mean_kernels is None:
+            if region.kernels.mean_force is None:
                 raise CaseError(
                     f"the law {region.law.name} has no discrete gradient",
                     key="dynamics.integrator",
