@@ -1,19 +1,17 @@
 #!/usr/bin/env python3
 """Writes docs/performance.md and its charts from docs/benchmarks/*.json. All numbers in it come from there.
 
-    ancf bench --json docs/benchmarks/bench.json                            # 5 minutes on two quiet cores
-    ancf bench accuracy stroke iterations scaling --json docs/benchmarks/sweeps.json    # 20 minutes
-    scripts/bench_peers.py --json docs/benchmarks/peers.json
-    scripts/write_performance.py
-
-What is known about a miss beside its numbers stands in docs/benchmarks/notes.toml, a line for each benchmark.
+ancf bench --json docs/benchmarks/bench.json                            # 5 minutes on two quiet cores
+ancf bench accuracy stroke iterations scaling alternatives --json docs/benchmarks/sweeps.json    # 20 minutes
+scripts/bench_peers.py --json docs/benchmarks/peers.json
+scripts/write_performance.py
 """
 
 from __future__ import annotations
 
 import json
+import re
 import sys
-import tomllib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -41,7 +39,13 @@ def main() -> int:
         return 2
     results = {**bench["results"], **sweeps.get("results", {})}
     pieces = [*head(bench), *targets(bench["results"]), *misses(bench["results"])]
-    pieces += [*side_by_side(peers), *charts(results), *solvers(results), *scaling(results)]
+    pieces += [
+        *side_by_side(peers),
+        *charts(results),
+        *solvers(results),
+        *alternatives(results),
+        *scaling(results),
+    ]
     (DOCS / "performance.md").write_text("\n".join(pieces) + "\n")
     print(DOCS / "performance.md")
     return 0
@@ -122,14 +126,12 @@ def targets(results: Report) -> list[str]:
 
 def misses(results: Report) -> list[str]:
     """What the time of each missed target is spent on."""
-    file = STORE / "notes.toml"
-    notes = tomllib.loads(file.read_text()) if file.is_file() else {}
     lines = []
     for name, result in results.items():
         if result["target"] is None or result["met"]:
             continue
         said = [result["problem"]] if "problem" in result else spent(result)
-        lines.append(f"- `{name}`: {'; '.join([*said, *([notes[name]] if name in notes else [])])}.")
+        lines.append(f"- `{name}`: {'; '.join(said)}.")
     return ["## Misses", "", *(lines or ["None."]), ""]
 
 
@@ -142,7 +144,10 @@ def spent(result: Report) -> list[str]:
     counts = facts.get("iterations", {})
     work = [f"{counts['newton']} Newton and {counts['linear']} linear iterations"] if counts else []
     far = f"{times:.2f} x of what is wanted"
-    return [far, *([", ".join(shown)] if shown else []), *work]
+    gain = (
+        [f"copying gains {facts['yardstick_gain']:.2f} in the same run"] if "yardstick_gain" in facts else []
+    )
+    return [far, *gain, *([", ".join(shown)] if shown else []), *work]
 
 
 def last(value: float | list[float]) -> float:
@@ -165,9 +170,26 @@ def side_by_side(peers: Report) -> list[str]:
             seconds = run.get("median")
             difference = run.get("difference")
             about = run.get("problem") or ", ".join(f"{part} {t:.3g}" for part, t in run["seconds"].items())
-            rows.append((f"{size}: {found['elements']}", name, seconds, run.get("ratio"), difference, about))
-    heads = ("elements", "program", "seconds", "times ancf_petsc", "difference of force", "parts, s")
+            counts = run.get("iterations", {})
+            rows.append(
+                (f"{size}: {found['elements']}", name, seconds, run.get("ratio"))
+                + (counts.get("newton"), counts.get("linear"), difference, about)
+            )
+    heads = (
+        "elements",
+        "program",
+        "seconds",
+        "times ancf_petsc",
+        "Newton",
+        "linear",
+        "difference of force",
+        "parts, s",
+    )
     lines += table(heads, rows)
+    lines += [
+        "`helped`: dolfinx with extrapolated starts of steps, and a preconditioner that is kept while it does its work, as here.",
+        "",
+    ]
     for size, found in peers["results"].items():
         ratio = found["best_peer_ratio"]
         if ratio is not None:
@@ -196,8 +218,12 @@ def charts(results: Report) -> list[str]:
             f"Errors are against the finest run of quadratic tetrahedra, forces of the quarter: {', '.join(best)}.",
             "",
         ]
-        failed = [f"- `{name}`: {found['problem']}" for name, found in results.items() if cannot(name, found)]
-        lines += ["These runs stopped before the full stroke:", "", *failed, ""] if failed else []
+        failed = [f"`{name}`" for name, found in results.items() if cannot(name, found)]
+        lines += (
+            [f"Stopped before the full stroke, reasons in docs/benchmarks: {', '.join(failed)}.", ""]
+            if failed
+            else []
+        )
     if sweep(results, "stroke"):
         draw_strokes(results, STORE / "stroke.png")
         lines += [
@@ -208,11 +234,17 @@ def charts(results: Report) -> list[str]:
         ]
         lines += ["A triangle: the path went on to the end that was asked for, 80 mm.", ""]
         rows = [
-            (*rest, 1e3 * found["median"], found["facts"]["why"])
+            (*rest, 1e3 * found["median"], ending(found["facts"]["why"]))
             for rest, found in sweep(results, "stroke").items()
         ]
         lines += table(("law", "mesh", "stroke, mm", "why it ends"), rows)
     return lines
+
+
+def ending(why: str) -> str:
+    """The stretch at which a path ended, from its message."""
+    found = re.search(r"smallest stretch (\S+), det F (\S+?);", why)
+    return f"smallest stretch {found[1]}, det F {found[2]}" if found else why
 
 
 def cannot(name: str, found: Report) -> bool:
@@ -238,6 +270,30 @@ def solvers(results: Report) -> list[str]:
     heads = ("element", "dof", "multigrid, iterations", "s", "two levels, iterations", "s")
     words = "Conjugate gradients to eight digits with the tangent of a clamped beam bent far; seconds with set-up, one rank."
     return ["## Linear solvers", "", words, "", *table(heads, rows)]
+
+
+def alternatives(results: Report) -> list[str]:
+    """Parts of this program beside what could stand in their place."""
+    rows = [
+        (
+            " ".join(parts[:-1]),
+            f"`{parts[-1]}`",
+            result.get("median"),
+            result["unit"],
+            *effort(result),
+            verdict(result),
+        )
+        for parts, result in sweep(results, "alternatives").items()
+    ]
+    words = "Parts of this program and what could stand in their place; docs/architecture.md says when."
+    heads = ("part", "by", "measured", "unit", "Newton", "linear", "")
+    return ["## Parts and alternatives", "", words, "", *table(heads, rows)] if rows else []
+
+
+def effort(result: Report) -> tuple[int | None, int | None]:
+    """Newton and linear iterations."""
+    counts = result.get("facts", {}).get("iterations", {})
+    return counts.get("newton"), counts.get("linear")
 
 
 def scaling(results: Report) -> list[str]:

@@ -22,6 +22,7 @@ from ancf_petsc.analysis.build import build, build_from
 from ancf_petsc.analysis.host.versions import versions
 from ancf_petsc.analysis.run import run_case
 from ancf_petsc.analysis.statics import StaticAnalysis
+from ancf_petsc.bench.alternatives import mass_solver, reader
 from ancf_petsc.bench.elements import compile_catalogue, points
 from ancf_petsc.bench.kernels import residual, tangent
 from ancf_petsc.bench.meshes import mesh_path
@@ -231,6 +232,8 @@ MEASUREMENTS: dict[str, Callable[..., Result]] = {
     "explicit": explicit,
     "stroke": stroke,
     "iterations": iterations,
+    "mass_solver": mass_solver,
+    "reader": reader,
     "messages": messages,
     "exchange_cost": exchange_cost,
 }

@@ -45,7 +45,9 @@ def block(
     }
 
 
-def pendulum(mesh: str, duration: float, outputs: int, **dynamics: Any) -> dict[str, Any]:
+def pendulum(
+    mesh: str, duration: float, outputs: int, *, petsc: dict[str, object] | None = None, **dynamics: Any
+) -> dict[str, Any]:
     """The pendulum of 0.5 x 0.1 x 0.1 m, let go from the horizontal."""
     tip = [[0.5, 0, 0], [0.5, 0.1, 0], [0.5, 0, 0.1], [0.5, 0.1, 0.1]]
     return {
@@ -57,6 +59,7 @@ def pendulum(mesh: str, duration: float, outputs: int, **dynamics: Any) -> dict[
         "load": [{"type": "gravity", "acceleration": GRAVITY}],
         "dynamics": {"duration": duration, "outputs": outputs, **dynamics},
         "probe": [{"name": "tip", "group": "corners"}],
+        "petsc": petsc or {},
     }
 
 

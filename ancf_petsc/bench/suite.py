@@ -18,7 +18,6 @@ from ancf_petsc.bench.row import CUBE_74K, CUBE_480K, Row
 from ancf_petsc.launcher import environment, on_ranks
 
 LONGEST = 3600.0
-GAIN_OF_YARDSTICK = 0.85
 Result = dict[str, Any]
 
 
@@ -112,7 +111,6 @@ def _derived(row: Row, results: dict[str, Result], measured: dict[str, Any]) -> 
         "samples": [other["median"] / of["median"]],
         "error": of["error"],
         "facts": {"yardstick_gain": gain},
-        "target": min(row.target or 0.0, GAIN_OF_YARDSTICK * gain),
     }
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from ancf_petsc.bench.row import BLOCK_480K, CUBE_74K, FORCE_480K, Row, press
+from ancf_petsc.bench.alternatives import LINEAR_SOLVERS, MASS_SOLVERS
+from ancf_petsc.bench.row import BLOCK_74K, BLOCK_480K, CUBE_74K, FORCE_74K, FORCE_480K, SOLUTION, Row, press
+from ancf_petsc.bench.table import PENDULUM
 from ancf_petsc.element.catalog import ELEMENTS
 
 STROKES = {"pvc_block": 0.025, "cube": 0.015}
@@ -168,4 +170,66 @@ def _points() -> list[Row]:
     ]
 
 
-SWEEPS = [*_points(), *_accuracy(), *_strokes(), *_iterations(), *_scaling()]
+def _alternatives() -> list[Row]:
+    """Parts of this program beside those of PETSc, SciPy and Gmsh that could stand in their place."""
+    solvers = [
+        Row(
+            f"alternatives/solver/{name}",
+            f"solution of the block of 73,606 elements, 2 ranks, conjugate gradients with {name}",
+            "run",
+            press(BLOCK_74K | {"petsc": options}, FORCE_74K, SOLUTION),
+            allowed=1e-6,
+            ranks=2,
+            repetitions=2,
+        )
+        for name, options in LINEAR_SOLVERS.items()
+    ]
+    masses = [
+        Row(
+            f"alternatives/mass/{name}",
+            "accelerations of the pendulum of 10,290 elements from forces, one core",
+            "mass_solver",
+            {"mesh": "pendulum:35x7x7", "solver": name},
+            unit="us",
+            allowed=1e-9,
+        )
+        for name in MASS_SOLVERS
+    ]
+    integrators = {
+        "runge_kutta_5dp": {"integrator": "runge_kutta_5dp", "tolerance": 3e-8},
+        "generalized_alpha": {"integrator": "generalized_alpha", "step": 1 / 800},
+    }
+    motions = [
+        Row(
+            f"alternatives/motion/{integrator}/{loops}",
+            f"pendulum of 96 elements, 1 s, {integrator}, steps in {words}",
+            "run",
+            {
+                "problem": PENDULUM | keys | {"petsc": petsc},
+                "known": {"tip": "pendulum_96"},
+                "parts": SOLUTION,
+            },
+            allowed=1.5e-4,
+            repetitions=3,
+        )
+        for integrator, keys in integrators.items()
+        for loops, words, petsc in (
+            ("compiled", "one compiled loop", {}),
+            ("ts", "PETSc's TS", {"ts_max_reject": 10}),
+        )
+    ]
+    readers = [
+        Row(
+            f"alternatives/reader/{name}",
+            "reading the mesh of 73,606 elements from Gmsh's text file, checks included",
+            "reader",
+            {"mesh": CUBE_74K, "reader": name},
+            allowed=1e-12,
+            repetitions=3,
+        )
+        for name in ("text", "gmsh")
+    ]
+    return [*solvers, *masses, *motions, *readers]
+
+
+SWEEPS = [*_points(), *_accuracy(), *_strokes(), *_iterations(), *_scaling(), *_alternatives()]
