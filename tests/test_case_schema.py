@@ -302,3 +302,51 @@ def test_any_value_anywhere_gives_a_case_or_a_case_error(table, inner, value):
     tables = {**copy.deepcopy(STATICS), "load": [{"type": "force", "group": "top", "total": [0, 0, 1]}]}
     with suppress(CaseError):
         case(tables, {table + inner: value})
+
+
+# --- control and bifurcations of statics
+
+
+FORCED = {**STATICS, "load": [{"type": "force", "group": "top", "total": [0, 0, -1]}], "output": {}}
+FORCED["constraint"] = STATICS["constraint"][:1]
+
+
+def test_paths_by_load_report_bifurcations_unless_asked():
+    assert (case(STATICS).spec.statics.control, case(STATICS).spec.statics.on_bifurcation) == (
+        "load",
+        "report",
+    )
+    spec = case(FORCED, {"statics.control": "arc_length", "statics.on_bifurcation": "stop"}).spec
+    assert (spec.statics.control, spec.statics.on_bifurcation) == ("arc_length", "stop")
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"statics.control": "arclength"}, "statics.control", "did you mean 'arc_length'"),
+        ({"statics.on_bifurcation": "folow"}, "statics.on_bifurcation", "did you mean 'follow'"),
+        ({"statics.on_bifurcation": True}, "statics.on_bifurcation", "report"),
+        ({"statics.on_bifurcatoin": "stop"}, "statics.on_bifurcatoin", "did you mean 'on_bifurcation'"),
+        (
+            {"statics.control": "arc_length", "statics.on_bifurcation": "follow"},
+            "statics.on_bifurcation",
+            'control = "load" follows',
+        ),
+        (
+            {"statics.control": "arc_length", "load.0.ramp": "cosine"},
+            "load.top.ramp",
+            '"linear" or "constant"',
+        ),
+        (
+            {"statics.control": "arc_length", "load.0.ramp": ((0, 0), (1, 1))},
+            "load.top.ramp",
+            'ramp = "linear"',
+        ),
+        ({"statics.control": "arc_length", "load.0.ramp": "constant"}, "statics.control", "linear"),
+        ({"statics.control": "arc_length", "load": ()}, "statics.control", "linear"),
+    ],
+)
+def test_wrong_controls_of_statics_are_refused(changes, key, words):
+    error = refusal(FORCED, changes)
+    assert error.key == key
+    assert words in str(error)

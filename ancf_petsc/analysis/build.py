@@ -24,6 +24,7 @@ from ancf_petsc.plan.curve import CurveChoice
 from ancf_petsc.plan.loads import KINDS
 from ancf_petsc.plan.materials import regions
 from ancf_petsc.plan.plan import Plan, make_plan
+from ancf_petsc.plan.space import nearby_origin
 
 
 @dataclass
@@ -76,7 +77,10 @@ def _make_body(case: Case, root: FromRoot[Plan]) -> Body:
     )
     numbering = with_vectors(nodes, first, row.node, row.slot)
     numbering, material, cell_numbers = _sort_cells(root, numbering)
+    slots = root.rows(lambda plan: plan.space.slots(), numbering.file_nodes)
+    origin = root.value(lambda plan: nearby_origin(plan.space.points, plan.mesh.size))
     reference = root.rows(lambda plan: plan.space.reference(), numbering.file_nodes)
+    reference[slots == 0] -= origin
     axes, section = root.value(lambda plan: plan.space.axes), spec.section
     tables = agree(
         comm,
@@ -94,8 +98,9 @@ def _make_body(case: Case, root: FromRoot[Plan]) -> Body:
         comm=comm,
         element=row,
         numbering=numbering,
+        origin=origin,
         reference=reference,
-        slots=root.rows(lambda plan: plan.space.slots(), numbering.file_nodes),
+        slots=slots,
         tables=tables,
         regions=regions(spec, row, material, numbering.own_cells),
         size=root.value(lambda plan: plan.mesh.size),

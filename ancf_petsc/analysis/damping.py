@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
 from math import pi, sqrt
 
 from petsc4py import PETSc
@@ -14,10 +16,10 @@ from ancf_petsc.input.load import Case
 from ancf_petsc.input.schema import CriticalMode
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.mass import Mass
-from ancf_petsc.model.ramp import Ramp
-from ancf_petsc.solve.load_path import LoadPath
-from ancf_petsc.solve.newton import Newton
+from ancf_petsc.solve.events import CriticalPoint
+from ancf_petsc.solve.rise import Rise, rising
 
+log = logging.getLogger("ancf")
 STATIC_TOLERANCE, SMALLEST_STEP = 1e-9, 1e-3
 RIGID = 1e-9
 """Of the scale of omega squared: what is below is a rigid motion."""
@@ -52,24 +54,19 @@ def damping_of(case: Case, assembly: Assembly, mass: Mass) -> Damping:
     return Damping(2 * omega, f"= 4 pi / T, critical for mode {number} of {state}: T = {2 * pi / omega:.6g}")
 
 
-def static_answer(case: Case, assembly: Assembly) -> PETSc.Vec:
-    """The body at rest under its loads and moves as they are at the end. Collective."""
-    model = assembly.model
-    linear = Ramp("linear")
-    loads = [replace(load, pattern=load.ramp.value(1.0) * load.pattern, ramp=linear) for load in model.loads]
-    drives = [
-        replace(drive, amplitude=drive.value(1.0), ramp=linear) if drive.amplitude else drive
-        for drive in model.drives
-    ]
-    newton = Newton(Assembly(replace(model, loads=loads, drives=drives)), STATIC_TOLERANCE)
-    path = LoadPath(newton, [1.0], [], SMALLEST_STEP, lambda step, x: None)
+def static_answer(
+    case: Case,
+    assembly: Assembly,
+    on_event: Callable[[CriticalPoint, PETSc.Vec], None] = lambda event, x: log.warning("%s", event.words()),
+) -> PETSc.Vec:
+    """The body at rest under its loads and moves as they are at the end; on_event: told of critical points on the path
+    there. Collective.
+    """
+    rise = Rise(rising(assembly.model, 1.0), STATIC_TOLERANCE)
     try:
-        path.run()
+        return rise.run([1.0], SMALLEST_STEP, on_event=on_event)
     except NoEquilibrium as error:
         raise _refused(case, f"there is no static answer to the loads ({error})") from error
-    finally:
-        newton.destroy()
-    return path.x
 
 
 def _refused(case: Case, why: str) -> CaseError:

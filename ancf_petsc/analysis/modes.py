@@ -10,7 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ancf_petsc.analysis.build import build_from
-from ancf_petsc.analysis.damping import static_answer
+from ancf_petsc.analysis.damping import RIGID, static_answer
 from ancf_petsc.analysis.host.versions import program_version
 from ancf_petsc.analysis.output_points import OutputPoints
 from ancf_petsc.errors import CaseError
@@ -22,18 +22,19 @@ from ancf_petsc.plan.plan import make_plan
 from ancf_petsc.results.folder import check_folder, claim_folder
 from ancf_petsc.results.store import ResultStore
 from ancf_petsc.results.tables import CsvTable
+from ancf_petsc.solve.events import place_of
 from ancf_petsc.solve.modes import Modes, modes_at
 from ancf_petsc.solve.petsc import petsc_options, refuse_unused
 
 LARGEST_SHOWN = 0.1  # of the size of the body: the largest displacement of a shape
-COLUMNS = ("mode", "frequency", "period", "omega", "critical_damping")
+COLUMNS = ("mode", "frequency", "period", "omega", "critical_damping", "growth_rate")
 log = logging.getLogger("ancf")
 
 
 def find_modes(
     case: Case, folder: Path, count: int, *, loaded: bool, force: bool, comm: MPI.Comm = MPI.COMM_WORLD
 ) -> NDArray[np.float64]:
-    """Rows (m, 5) of COLUMNS, written to modes.csv; shapes to results.h5 and .xdmf. Collective. Raises
+    """Rows (m, 6) of COLUMNS, written to modes.csv; shapes to results.h5 and .xdmf. Collective. Raises
     CaseError.
 
     loaded: of the body at rest under its loads, else of the undeformed one.
@@ -51,6 +52,7 @@ def find_modes(
         refuse_unused(case.spec.petsc)
     on_root(comm, lambda: claim_folder(folder))
     rows = _rows(modes)
+    _warn_of_unstable(assembly, modes, rows[:, 5])
     if comm.rank == 0:
         with CsvTable(folder / "modes.csv", COLUMNS) as table:
             for row in rows:
@@ -75,7 +77,25 @@ def _rows(modes: Modes) -> NDArray[np.float64]:
     with np.errstate(divide="ignore"):
         period = 1.0 / frequency
     numbers = np.arange(1, len(frequency) + 1)
-    return np.stack((numbers, frequency, period, 2 * np.pi * frequency, 4 * np.pi * frequency), axis=1)
+    growth = np.sqrt(np.maximum(-modes.omega_squared, 0.0))
+    growth[modes.omega_squared > -RIGID * modes.scale] = 0.0
+    return np.stack(
+        (numbers, frequency, period, 2 * np.pi * frequency, 4 * np.pi * frequency, growth), axis=1
+    )
+
+
+def _warn_of_unstable(assembly: Assembly, modes: Modes, growth: NDArray) -> None:
+    """Name the modes that grow (m,) instead of vibrating: the state is no stable rest."""
+    for number in np.flatnonzero(growth):
+        places = place_of(assembly, modes.shapes[number])
+        place, along = (", ".join(f"{c:.4g}" for c in vector) for vector in places)
+        log.warning(
+            "mode %d does not vibrate: the state is unstable, it grows as exp(%.6g t); it moves most at (%s) along (%s)",
+            number + 1,
+            growth[number],
+            place,
+            along,
+        )
 
 
 def _need_density(case: Case) -> None:

@@ -101,6 +101,6 @@ def set_velocity(v: PETSc.Vec, mass: Mass, spec: InitialSpec) -> None:
     model = mass.assembly.model
     centre = mass.centre() if spec.centre == "mass" else np.array(spec.centre)
     arm, uniform = model.reference[: model.owned].copy(), np.zeros((model.owned, 3))
-    arm[model.own_positions] -= centre
+    arm[model.own_positions] -= centre - model.origin
     uniform[model.own_positions] = spec.velocity
     v.array[:] = (uniform + np.cross(spec.spin, arm)).ravel()

@@ -144,11 +144,13 @@ class MotionRun:
 
     def _potential_energy(self) -> float:
         """- sum m g . r with gravity as it is now."""
-        positions = self.integrator.x.array_r.reshape(-1, 3)
+        model = self.assembly.model
+        positions = self.integrator.x.array_r.reshape(-1, 3).copy()
+        positions[model.own_positions] += model.origin
         s = self.integrator.time / self.duration
         own = sum(
             -load.ramp.value(s) * float(np.vdot(load.pattern, positions))
-            for load in self.assembly.model.loads
+            for load in model.loads
             if load.acceleration is not None
         )
         return combined(self.assembly.comm, own)

@@ -6,7 +6,7 @@ import logging
 import resource
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
@@ -146,7 +146,7 @@ def _summarise(
     clock: Clock,
     totals: Mapping[str, int],
     final: Mapping[str, float],
-    facts: Mapping[str, float],
+    facts: Mapping[str, Any],
     comm: MPI.Comm,
 ) -> None:
     memory = comm.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)

@@ -12,13 +12,21 @@ from petsc4py import PETSc
 from ancf_petsc.analysis.host.clock import Clock
 from ancf_petsc.analysis.record import COUNTS, Record
 from ancf_petsc.errors import Interrupted, NoEquilibrium
+from ancf_petsc.input.analysis import StaticsSpec
 from ancf_petsc.log import STEPS
 from ancf_petsc.model.measures import conjugates
 from ancf_petsc.model.work import PathWork
-from ancf_petsc.solve.load_path import LoadPath, PathStep
+from ancf_petsc.parallel.exchange import combined
+from ancf_petsc.solve.arc_length import ArcLength
+from ancf_petsc.solve.events import CriticalPoint
+from ancf_petsc.solve.load_path import LoadPath, Marks, PathStep
 from ancf_petsc.solve.newton import Newton
+from ancf_petsc.solve.rise import Rise, begins_loaded, rising
+from ancf_petsc.solve.stability import beyond_the_law
 
 log = logging.getLogger(STEPS)
+RISE = tuple(k / 10 for k in range(1, 11))
+"""Where the way to loads that do not begin at 0 stops for the sum of its work."""
 
 
 class StaticRun:
@@ -33,46 +41,114 @@ class StaticRun:
         newton: Newton,
         record: Record,
         times: Sequence[float],
-        smallest_step: float,
+        spec: StaticsSpec,
         clock: Clock,
         watch: Callable[[float], None],
         stop: Callable[[], bool],
     ) -> None:
         self.newton, self.record, self.clock, self.watch = newton, record, clock, watch
+        self.spec, self.stop = spec, stop
         self.assembly = newton.assembly
-        self.times = set(times)
         self.totals = dict.fromkeys(COUNTS, 0)
+        self.events: list[dict] = []
+        self.doubts: str | None = None
         self._since = dict.fromkeys(COUNTS, 0)
         model = self.assembly.model
         ramps = [drive.ramp for drive in model.drives] + [load.ramp for load in model.loads]
-        self.corners = {corner for ramp in ramps for corner in ramp.corners()}
+        self.marks = Marks.of(times, [corner for ramp in ramps for corner in ramp.corners()])
         self.work = PathWork(model.drives, model.loads)
-        self.path = LoadPath(newton, times, sorted(self.corners), smallest_step, self._on_step, stop)
+        self._x, self._written = self.assembly.reference_vector(), 0.0
 
     def go(self) -> None:
         """To s = 1. Raises NoEquilibrium or Interrupted, with the last good state saved."""
-        start = np.zeros((self.assembly.model.owned, 3))
-        self.work.start(0.0, *conjugates(self.assembly, self.path.x, start))
-        self._write(0.0, self.path.x, start)
+        nothing = np.zeros((self.assembly.model.owned, 3))
+        self._write(0.0, self._x, nothing)
+        x = self._rise() if begins_loaded(self.assembly.model) else self._x.copy()
+        self.newton.set_pseudo_time(0.0)
+        length = 0.0 if self.spec.control == "arc_length" else None
+        self.work.start(0.0, *conjugates(self.assembly, x, self.newton.out_of_balance(x)), length)
+        path = (ArcLength if self.spec.control == "arc_length" else LoadPath)(
+            self.newton,
+            self.marks,
+            self.spec.smallest_step,
+            self._on_step,
+            self.stop,
+            start=x,
+            on_bifurcation=self.spec.on_bifurcation,
+            on_event=self._on_event,
+        )
         try:
-            self.path.run()
+            path.run()
         except (NoEquilibrium, Interrupted):
-            self._save_last_state()
+            self._save_last_state(path)
             raise
+        self._note_doubts(path.s, path.x)
+
+    def _rise(self) -> PETSc.Vec:
+        """The state at s = 0 where ramps do not begin at 0: loads and moves come up to it in proportion."""
+        log.info("loads or moves are not zero at pseudo-time 0: they come up to there first, in proportion")
+        model = rising(self.assembly.model, 0.0)
+        rise = Rise(model, self.newton.tolerance)
+        work, assembly = PathWork(model.drives, model.loads), rise.newton.assembly
+        work.start(0.0, *conjugates(assembly, self._x, np.zeros((model.owned, 3))))
+
+        def add(step: PathStep, x: PETSc.Vec) -> None:
+            work.add(step.s, *conjugates(assembly, x, rise.newton.out_of_balance(x)))
+            self._count(step)
+
+        try:
+            return rise.run(
+                RISE,
+                self.spec.smallest_step,
+                add,
+                interrupted=self.stop,
+                on_bifurcation=self.spec.on_bifurcation,
+                on_event=lambda event, x: self._on_event(
+                    event, x, "before pseudo-time 0, on the way to it: "
+                ),
+            )
+        except NoEquilibrium as error:
+            raise NoEquilibrium(f"before pseudo-time 0, where loads and moves come up: {error}") from error
+        finally:
+            self.work.total = work.total
+
+    def _count(self, step: PathStep) -> None:
+        for name, count in zip(COUNTS, (step.newton, step.linear, 1), strict=True):
+            self.totals[name] += count
+            self._since[name] += count
 
     def _on_step(self, step: PathStep, x: PETSc.Vec) -> None:
         out_of_balance = self.newton.out_of_balance(x)
         scalars = conjugates(self.assembly, x, out_of_balance)
-        self.work.add(step.s, *scalars)
-        if step.s in self.corners:
+        self.work.add(step.s, *scalars, step.length)
+        if step.s in self.marks.corners:
             self.work.start(step.s, *scalars)
-        for name, count in zip(COUNTS, (step.newton, step.linear, 1), strict=True):
-            self.totals[name] += count
-            self._since[name] += count
-        if step.s in self.times:
+            self._note_doubts(step.s, x)
+        self._count(step)
+        if step.output:
             self._write(step.s, x, out_of_balance)
         self._tell(step, x, out_of_balance)
         self.watch(step.s)
+
+    def _on_event(self, event: CriticalPoint, x: PETSc.Vec, where: str = "") -> None:
+        """Say it at once; the summary has it too, with stroke and force where the case asks for a curve."""
+        curve = self.record.curve(x, self.newton.out_of_balance(x))
+        load = self._load_at(event.pseudo_time)
+        shown = "".join(f", {name} {value:.6g}" for name, value in curve.items())
+        shown += f", loads ({', '.join(f'{c:.4g}' for c in load)})" if any(load) else ""
+        log.warning("%s%s%s", where, event.words(), shown)
+        self.events.append({**event.facts(), **curve, "load": load})
+
+    def _note_doubts(self, s: float, x: PETSc.Vec) -> None:
+        """Warn once where the law is beyond its limit, at the end of the path and where loads turn; the summary has it."""
+        if self.doubts is None and (found := beyond_the_law(self.assembly, x)) is not None:
+            self.doubts = f"at pseudo-time {s:.6g} {found}"
+            log.warning("%s", self.doubts)
+
+    def _load_at(self, s: float) -> list[float]:
+        """The sum of the loads at s."""
+        total = self.assembly.external_force(s)[self.assembly.model.own_positions].sum(axis=0)
+        return list(map(float, combined(self.assembly.comm, total)))
 
     def _write(self, s: float, x: PETSc.Vec, out_of_balance: NDArray) -> None:
         with self.clock.part("output"):
@@ -81,10 +157,10 @@ class StaticRun:
         self._since = dict.fromkeys(COUNTS, 0)
         self._written = s
 
-    def _save_last_state(self) -> None:
-        if self.path.s != self._written:
-            self.newton.set_pseudo_time(self.path.s)
-            self._write(self.path.s, self.path.x, self.newton.out_of_balance(self.path.x))
+    def _save_last_state(self, path: LoadPath | ArcLength) -> None:
+        if path.s != self._written:
+            self.newton.set_pseudo_time(path.s)
+            self._write(path.s, path.x, self.newton.out_of_balance(path.x))
 
     def _tell(self, step: PathStep, x: PETSc.Vec, out_of_balance: NDArray) -> None:
         curve = self.record.curve(x, out_of_balance)

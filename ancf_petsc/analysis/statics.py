@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from ancf_petsc.analysis.build import Built
 from ancf_petsc.analysis.host.clock import Clock
@@ -23,6 +24,7 @@ class StaticAnalysis:
         self.times = output_times(case.spec, case.file)
         self.assembly = Assembly(built.model)
         self.newton = Newton(self.assembly, self.spec.tolerance)
+        self._run: StaticRun | None = None
 
     def prepare(self) -> None:
         """Set the solvers up, so that every option has been asked for."""
@@ -32,15 +34,17 @@ class StaticAnalysis:
         """One line: the solver."""
         return self.newton.linear.describe()
 
-    def facts(self) -> dict[str, float]:
+    def facts(self) -> dict[str, Any]:
         """What the summary holds beside what it has of every run."""
-        return {}
+        run = self._run
+        return {"critical_points": run.events, "doubts": run.doubts} if run else {}
 
     def begin(
         self, record: Record, clock: Clock, watch: Callable[[float], None], stop: Callable[[], bool]
     ) -> StaticRun:
         """The run, ready to go."""
-        return StaticRun(self.newton, record, self.times, self.spec.smallest_step, clock, watch, stop)
+        self._run = StaticRun(self.newton, record, self.times, self.spec, clock, watch, stop)
+        return self._run
 
     def destroy(self) -> None:
         """Free PETSc's objects."""

@@ -12,7 +12,7 @@ from ancf_petsc.bench.problems import beam
 from ancf_petsc.input.load import case_from_dict
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import on_root
-from ancf_petsc.solve.load_path import LoadPath
+from ancf_petsc.solve.load_path import LoadPath, Marks
 from ancf_petsc.solve.newton import Newton
 from ancf_petsc.solve.petsc import petsc_options
 
@@ -28,7 +28,7 @@ def iterations(comm: MPI.Comm, *, mesh: str, element: str, solver: str, repetiti
     case = comm.bcast(on_root(comm, lambda: case_from_dict(beam(mesh, element), ".", "beam")))
     assembly = Assembly(build(case, comm).model)
     bending = Newton(assembly, 1e-6)
-    path = LoadPath(bending, [1.0], [], 1e-3, lambda step, x: None)
+    path = LoadPath(bending, Marks.of([1.0], ()), 1e-3)
     path.run()
     bending.destroy()
     with petsc_options(SOLVERS[solver]):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from ancf_petsc.cli.run import add_case_arguments, changes
@@ -46,6 +47,14 @@ def execute(arguments: argparse.Namespace) -> int:
     if comm.rank == 0:
         title = "modes of the body under its loads" if arguments.loaded else "modes of the unloaded body"
         columns = ("mode", "frequency", "period", "omega", "alpha = 4 pi / T")
-        show_table(columns, [(int(row[0]), *map(float, row[1:])) for row in rows], title=title)
+        show_table(columns, [_shown(row) for row in rows], title=title)
         print(f"shapes in {folder}; ancf view {folder} shows them one by one")
     return 0
+
+
+def _shown(row: Sequence[float]) -> tuple[object, ...]:
+    """A row of the table; of a mode that grows, how fast."""
+    number, *vibration, growth = map(float, row)
+    return (
+        (int(number), f"unstable: exp({growth:.6g} t)", "", "", "") if growth else (int(number), *vibration)
+    )

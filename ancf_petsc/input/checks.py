@@ -28,7 +28,8 @@ def check(spec: CaseSpec) -> None:
 def problems(spec: CaseSpec) -> list[PydanticCustomError]:
     """All that is wrong between the tables, the most basic first."""
     checks = (
-        *(_one_analysis, _materials, _densities, _unions, _probes, _motion, _strokes, _section, _held_slopes),
+        *(_one_analysis, _materials, _densities, _unions, _probes, _motion, _strokes, _arc_length, _section),
+        _held_slopes,
         _options,
     )
     return [found for check in checks for found in check(spec)]
@@ -176,6 +177,39 @@ def _driver(spec: CaseSpec, stroke: Direction) -> ConstraintSpec | None:
 
 def _largest(ramp: Ramp) -> float:
     return 1.0 if isinstance(ramp, str) else max(abs(factor) for _, factor in ramp)
+
+
+def _arc_length(spec: CaseSpec) -> Problems:
+    """The load factor of a path by arc length is the pseudo-time itself, and may fall: ramps have to go on below 0."""
+    if spec.statics is None or spec.statics.control != "arc_length":
+        return
+    if spec.statics.on_bifurcation == "follow":
+        yield problem(
+            "paths by arc length go straight on at bifurcations",
+            at=["statics", "on_bifurcation"],
+            got="follow",
+            expected='"report" or "stop" with control = "arc_length"',
+            cure='control = "load" follows',
+        )
+    driven = [("load", k, load.ramp) for k, load in enumerate(spec.load)]
+    driven += [("constraint", k, row.ramp) for k, row in enumerate(spec.constraint) if row.move]
+    for table, index, ramp in driven:
+        if ramp not in ("linear", "constant"):
+            yield problem(
+                'control = "arc_length" makes the pseudo-time the load factor',
+                at=[table, index, "ramp"],
+                got=ramp,
+                expected='"linear" or "constant"',
+                cure='write ramp = "linear", or control = "load"',
+            )
+    if all(ramp == "constant" for *_, ramp in driven):
+        yield problem(
+            'control = "arc_length" without a load that grows',
+            at=["statics", "control"],
+            got="arc_length",
+            expected='a load or move whose ramp is "linear"',
+            cure='give one, or write control = "load"',
+        )
 
 
 def _section(spec: CaseSpec) -> Problems:

@@ -49,8 +49,9 @@ class Region:
 class Body:
     """v local nodal vectors (owned first), e local cells, those of one region together and its own ones first.
 
-    reference (v, 3): nodal vectors of the undeformed body. slots (v,): 0 for a position, j for the j-th slope of its node, which
-    follows the position j places behind. Slopes are multiplied by lengths.
+    origin (3,): in the file's coordinates, where the body has its own: one far away would lose digits.
+    reference (v, 3): nodal vectors of the undeformed body, positions from `origin`. slots (v,): 0 for a position, j for the
+    j-th slope of its node, which follows the position j places behind. Slopes are multiplied by lengths.
     tables: the cells as every kernel takes them, see `kernel/choice`; they have nodes (e, a) and volumes (e,).
     size: diagonal of the box around the body. cell_numbers: (e,) number of each cell in the mesh file.
     """
@@ -58,6 +59,7 @@ class Body:
     comm: MPI.Comm
     element: Element
     numbering: Numbering
+    origin: Floats
     reference: Floats
     slots: NDArray[np.int8]
     tables: Any

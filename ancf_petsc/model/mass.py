@@ -87,16 +87,16 @@ class Mass:
         return combined(self.comm, 0.5 * float(np.vdot(velocity, self.times(velocity))))
 
     def momenta(self, x: PETSc.Vec, velocity: NDArray) -> tuple[NDArray, NDArray]:
-        """Linear and angular momentum (3,), the latter about the origin. Collective."""
+        """Linear and angular momentum (3,), the latter about the file's origin. Collective."""
         carried = self.times(velocity)
         linear = carried[self.assembly.model.own_positions].sum(axis=0)
         moments = x.array_r.reshape(-1, 3).T @ carried
         angular = np.array([moments[i, j] - moments[j, i] for i, j in ((1, 2), (2, 0), (0, 1))])
         both = combined(self.comm, np.concatenate((linear, angular)))
-        return both[:3], both[3:]
+        return both[:3], both[3:] + np.cross(self.assembly.model.origin, both[:3])
 
     def centre(self) -> NDArray[np.float64]:
-        """Centre of mass (3,) of the undeformed body. Collective."""
+        """Centre of mass (3,) of the undeformed body, in the file's coordinates. Collective."""
         model = self.assembly.model
         uniform = np.zeros((model.owned, 3))
         uniform[model.own_positions] = 1.0
@@ -104,7 +104,7 @@ class Mass:
         moment = share @ model.reference[: model.owned]
         total = share[model.own_positions].sum()
         sums = combined(self.comm, np.append(moment, total))
-        return sums[:3] / sums[3]
+        return model.origin + sums[:3] / sums[3]
 
 
 def mean_products(element: Element) -> NDArray[np.float64]:

@@ -17,12 +17,12 @@ def reaction(assembly: Assembly, out_of_balance: NDArray, group: str) -> NDArray
 
 
 def mean_position(assembly: Assembly, x: PETSc.Vec, name: str) -> tuple[NDArray, NDArray]:
-    """Weighted mean position (3,) of a group's nodes and its displacement (3,)."""
+    """Weighted mean position (3,) of a group's nodes, in the file's coordinates, and its displacement (3,)."""
     vectors, weights = assembly.model.means[name]
     now = weights @ x.array_r.reshape(-1, 3)[vectors]
     before = weights @ assembly.model.reference[vectors]
     now, before = combined(assembly.comm, np.stack((now, before)))
-    return now, now - before
+    return now + assembly.model.origin, now - before
 
 
 def mean_stress(assembly: Assembly, cauchy: NDArray, group: str, axis: int) -> float:

@@ -29,17 +29,22 @@ class PathWork:
         self.total = 0.0
         self._before = 0.0
         self._settled = False
-        self._states: list[tuple[float, NDArray, NDArray]] = []
+        self._states: list[tuple[float, NDArray, NDArray, float | None]] = []
 
-    def start(self, s: float, reactions: NDArray, displacements: NDArray) -> None:
+    def start(
+        self, s: float, reactions: NDArray, displacements: NDArray, length: float | None = None
+    ) -> None:
         """Begin a smooth piece of the path: at the start, and where a ramp has a corner."""
         self._before = self.total
         self._settled = False
-        self._states = [(s, reactions, displacements)]
+        self._states = [(s, reactions, displacements, length)]
 
-    def add(self, s: float, reactions: NDArray, displacements: NDArray) -> None:
-        """Go on to the state at s. While few states are known, all of the piece is integrated again with them."""
-        self._states.append((s, reactions, displacements))
+    def add(self, s: float, reactions: NDArray, displacements: NDArray, length: float | None = None) -> None:
+        """Go on to the state at s. While few states are known, all of the piece is integrated again with them.
+
+        length: of the path so far, where s may turn back: everything is a polynomial of it then.
+        """
+        self._states.append((s, reactions, displacements, length))
         if len(self._states) > POINTS:
             del self._states[0]
         newest = len(self._states) - 1
@@ -52,20 +57,31 @@ class PathWork:
     def _increment(self, k: int) -> float:
         """Work between states k - 1 and k."""
         times = [state[0] for state in self._states]
+        lengths = [state[3] for state in self._states if state[3] is not None]
         work = 0.0
         for m, drive in enumerate(self.drives):
             reactions = [state[1][m] for state in self._states]
-            work += drive.amplitude * _integral(drive.ramp, times, reactions, k)
+            work += drive.amplitude * _integral(drive.ramp, times, reactions, k, lengths)
         for number, load in enumerate(self.loads):
             seen = [state[2][number] for state in self._states]
             ends = [load.ramp.value(times[j]) * seen[j] for j in (k - 1, k)]
-            work += ends[1] - ends[0] - _integral(load.ramp, times, seen, k)
+            work += ends[1] - ends[0] - _integral(load.ramp, times, seen, k, lengths)
         return work
 
 
-def _integral(ramp: Ramp, times: Sequence[float], values: Sequence[float], k: int) -> float:
-    """∫ values df from state k - 1 to k, f the factor of the ramp, in which the values follow a polynomial."""
+def _integral(
+    ramp: Ramp, times: Sequence[float], values: Sequence[float], k: int, lengths: Sequence[float]
+) -> float:
+    """∫ values df from state k - 1 to k, f the factor of the ramp, in which the values follow a polynomial; values and
+    factor are polynomials of the length of the path where that is given.
+    """
     factors = np.array([ramp.value(t) for t in times])
+    if len(lengths) == len(times):
+        along = np.array(lengths)
+        middle, half = (along[k] + along[k - 1]) / 2, (along[k] - along[k - 1]) / 2
+        points = middle + half * ABSCISSAE
+        rates = np.polynomial.Polynomial.fit(along, factors, len(along) - 1).deriv()
+        return float(half * WEIGHTS @ (_lagrange(along, points) @ values * rates(points)))
     low, high = factors[k - 1], factors[k]
     if low == high:
         return 0.0

@@ -23,7 +23,7 @@ def output_times(spec: CaseSpec, file: Path | None = None) -> list[float]:
 
 
 def _stroke_times(spec: CaseSpec, strokes: tuple[float, ...], file: Path | None) -> list[float]:
-    """When the ramp of the driven group first reaches each stroke."""
+    """When the ramp of the driven group first reaches each stroke, in each of the directions it goes to."""
     curve = spec.output.curve
     assert curve is not None
     axis: Any = curve.stroke.axis
@@ -32,10 +32,10 @@ def _stroke_times(spec: CaseSpec, strokes: tuple[float, ...], file: Path | None)
     ramp = make_ramp(driver.ramp, "linear")
     times = []
     for stroke in strokes:
-        s = ramp.first_time(
-            min(stroke / amplitude, 1.0) if stroke <= amplitude * (1 + 1e-12) else stroke / amplitude
-        )
-        if s is None:
+        factor = stroke / amplitude
+        factor = min(factor, 1.0) if factor <= 1 + 1e-12 else factor
+        found = [s for s in (ramp.first_time(factor), ramp.first_time(-factor)) if s is not None]
+        if not found:
             raise CaseError(
                 file=file,
                 key="statics.strokes",
@@ -43,5 +43,5 @@ def _stroke_times(spec: CaseSpec, strokes: tuple[float, ...], file: Path | None)
                 expected=f"a stroke that the motion of {driver.group!r} reaches",
                 cure=f"it moves by {amplitude:g} at most",
             )
-        times.append(s)
+        times += found
     return [s for s in times if s > 0.0]

@@ -184,3 +184,14 @@ class Space:
                 cure="turn the mesh",
             )
         return axes
+
+
+def nearby_origin(points: Floats, size: float) -> Floats:
+    """(3,) a point about which bodies far from the file's origin are computed; the origin itself for those near it.
+
+    Its coordinates are multiples of a power of two of at least the body's size, so that those of the body pass through
+    the shift without rounding. points (n, 3) in use.
+    """
+    grid = 2.0 ** np.ceil(np.log2(size))
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    return np.round(centre / grid) * grid

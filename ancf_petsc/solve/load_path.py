@@ -8,95 +8,163 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, isclose
 
+import numpy as np
 from petsc4py import PETSc
 
 from ancf_petsc.errors import Interrupted, NoEquilibrium
+from ancf_petsc.solve.critical import Watch
+from ancf_petsc.solve.events import CriticalPoint, Crossing
 from ancf_petsc.solve.extrapolation import Extrapolation
 from ancf_petsc.solve.newton import Newton, Outcome
 from ancf_petsc.solve.stability import why_it_ends
 
 LONGEST_FIRST_STEP = 0.1
 QUICK, SLOW = 5, 9
+FAR, FASTER, NEAR = 1.0, 3.0, 0.01
+"""What is looked at by a step back: states farther from the predicted one than that is away, and steps that move the body so
+many times faster than the one before; both if it is more than this part of its size.
+"""
+SAME_STATE = 1e-3
+SAME_TIME = 1e-9
+"""Pseudo-times closer than this are one."""
 log = logging.getLogger("ancf")
 
 
 @dataclass(frozen=True)
 class PathStep:
-    """An accepted step of the path, told to whoever watches."""
+    """An accepted step of the path. length: of the path so far, where it is followed by its length. output: asked for."""
 
     s: float
     size: float
     newton: int
     linear: int
     residuals: tuple[float, ...]
+    output: bool = False
+    length: float | None = None
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Where a path goes. outputs: pseudo-times to hit exactly, ascending, the last is 1. corners: where it is not smooth."""
+
+    outputs: tuple[float, ...]
+    corners: frozenset[float]
+
+    @staticmethod
+    def of(outputs: Sequence[float], corners: Sequence[float]) -> Marks:
+        """Times that differ by rounding are one: an output's, where there is one."""
+        times: list[float] = []
+        for s in sorted({*outputs, 1.0}, reverse=True):
+            if not times or times[-1] - s > SAME_TIME:
+                times.append(s)
+        times.reverse()
+        found: set[float] = set()
+        for corner in sorted(corners):
+            near = min((*times, *found), key=lambda s: abs(s - corner))
+            found.add(near if abs(near - corner) <= SAME_TIME else corner)
+        return Marks(tuple(times), frozenset(found))
+
+    def after(self, s: float) -> float:
+        """The next of them."""
+        return min(mark for mark in (*self.outputs, *self.corners) if mark > s)
 
 
 class LoadPath:
     """Moves a state along the path. `on_step(step, x)` is called after each accepted step.
 
-    outputs: pseudo-times to hit exactly, ascending, the last is 1. corners: those where the path is not smooth.
+    start: the state at s = 0, default the undeformed one. watch: looks for critical points; `on_event(event, x)` is
+    called at each. on_bifurcation: what to do there: report, stop or follow.
     """
 
     def __init__(
         self,
         newton: Newton,
-        outputs: Sequence[float],
-        corners: Sequence[float],
+        marks: Marks,
         smallest_step: float,
-        on_step: Callable[[PathStep, PETSc.Vec], None],
+        on_step: Callable[[PathStep, PETSc.Vec], None] = lambda step, x: None,
         interrupted: Callable[[], bool] = lambda: False,
+        *,
+        start: PETSc.Vec | None = None,
+        on_bifurcation: str = "report",
+        on_event: Callable[[CriticalPoint, PETSc.Vec], None] = lambda event, x: None,
     ) -> None:
         self.newton = newton
         self.assembly = newton.assembly
-        self.marks = sorted({*outputs, *corners, 1.0})
-        self.corners = set(corners)
+        self.marks = marks
         self.smallest_step = smallest_step
         self.on_step = on_step
         self.interrupted = interrupted
         self.s = 0.0
-        self.x = self.assembly.reference_vector()
+        self.x = start or self.assembly.reference_vector()
+        self.watch = Watch(newton)
+        self._crossing = Crossing(self.watch, on_bifurcation, on_event)
+        self._rate = np.inf  # of the last step: largest change of a component over that of s
+        self._at_hand = False  # whether the linear solver holds a tangent of the last trial
         self._past = Extrapolation()
         self._past.add(0.0, self.x)
-        self._step = min(self.marks[0], LONGEST_FIRST_STEP)
+        self._step = min(marks.after(0.0), LONGEST_FIRST_STEP)
 
     def run(self) -> None:
         """Follow the path to s = 1. Raises NoEquilibrium where it ends, Interrupted when asked to stop."""
-        while self.s < 1.0:
-            if self.interrupted():
-                raise Interrupted(f"stopped at pseudo-time {self.s:.6g}; everything up to here is saved")
-            self._advance()
+        try:
+            while self.s < 1.0:
+                if self.interrupted():
+                    raise Interrupted(f"stopped at pseudo-time {self.s:.6g}; everything up to here is saved")
+                self._advance()
+        finally:
+            self.watch.destroy()
 
     def _advance(self) -> None:
         """One accepted step, after as many halvings as it takes."""
-        linear = self.newton.linear
         while True:
             target = self._target()
             trial, outcome = self._attempt(target)
-            if outcome.converged:
-                break
-            trial.destroy()
-            size = (target - self.s) / 2
-            if linear.gave_up() and (linear.is_cheap_to_factor or size < self.smallest_step):
-                log.info("  the tangent is not positive definite: factoring from now on")
-                linear.fall_back_to_direct()
+            if not outcome.converged:
+                trial.destroy()
+                self._shorten(target, outcome.reason)
                 continue
-            if size < self.smallest_step:
-                raise NoEquilibrium(
-                    why_it_ends(self.newton, self.x, self.s, outcome.reason, self.smallest_step)
-                )
-            log.info("  step to s = %.6g failed (%s): halved to %.3g", target, outcome.reason, size)
-            self._step = size
-        step = PathStep(target, target - self.s, outcome.newton, outcome.linear, outcome.residuals)
-        self._accept(target, trial)
+            at_output = target in self.marks.outputs
+            found = self._crossing.judge(
+                self.s,
+                target,
+                trial,
+                self.smallest_step,
+                at_hand=self._at_hand,
+                at_output=at_output,
+                effort=outcome.linear,
+            )
+            if found is not None:
+                break
+            log.info("  step to s = %.6g led to an unstable state: shortened", target)
+            self._step = (target - self.s) / 4
+        s, x = found
+        step = PathStep(
+            s, s - self.s, outcome.newton, outcome.linear, outcome.residuals, s in self.marks.outputs
+        )
+        self._accept(s, x, branched=s != target or x is not trial)
         self._adapt(step)
         self.on_step(step, self.x)
+        self._crossing.stop_if_asked()
+
+    def _shorten(self, target: float, reason: str) -> None:
+        """After a step that failed: another linear solver, half the step, or the end of the path."""
+        linear, size = self.newton.linear, (target - self.s) / 2
+        if linear.gave_up() and (linear.is_cheap_to_factor or size < self.smallest_step):
+            log.info("  the tangent is not positive definite: factoring from now on")
+            linear.fall_back_to_direct()
+            return
+        if size < self.smallest_step:
+            limit = self._crossing.limit_point(self.s, self.x, self.smallest_step)
+            raise NoEquilibrium(why_it_ends(self.newton, self.x, self.s, reason, self.smallest_step, limit))
+        log.info("  step to s = %.6g failed (%s): halved to %.3g", target, reason, size)
+        self._step = size
 
     def _target(self) -> float:
         """Where the next step ends: on the next mark, or on an equal part of the way to it."""
-        mark = next(m for m in self.marks if m > self.s)
+        mark = self.marks.after(self.s)
         parts = ceil((mark - self.s) / self._step * (1 - 1e-9))
         return mark if parts <= 1 else self.s + (mark - self.s) / parts
 
@@ -105,14 +173,59 @@ class LoadPath:
         trial = self._past.at(target)
         if trial is not None:
             self.assembly.set_driven(trial, target)
-            outcome = self.newton.solve(target, trial)
+            outcome = self._solve(target, trial)
             if outcome.converged:
                 return trial, outcome
             trial.destroy()
         trial = self.x.copy()
         self.newton.predict(trial, self.s, target)
+        if self.watch.begin(self.s):
+            self._crossing.remember(self.s, self.x)
         self._note_slope(trial, target)
-        return trial, self.newton.solve(target, trial)
+        predicted = trial.copy()
+        outcome = self._solve(target, trial)
+        if not outcome.converged and self.newton.can_be_careful and not self.newton.linear.gave_up():
+            careful = self._solve(target, predicted, careful=True)
+            if careful.converged:
+                log.info("  step to s = %.6g: %s; with a line search it is found", target, outcome.reason)
+                trial, predicted, outcome = predicted, trial, careful
+        predicted.destroy()
+        return trial, outcome
+
+    def _solve(self, target: float, x: PETSc.Vec, *, careful: bool = False) -> Outcome:
+        """Newton from a predicted state x. What it finds far from there belongs to this path if a step leads back."""
+        predicted = x.copy()
+        outcome = self.newton.solve(target, x, careful=careful)
+        self._at_hand = outcome.newton > 0
+        if outcome.converged:
+            corrected, moved = self._distance(x, predicted), self._distance(x, self.x)
+            astray = corrected > FAR * self._distance(predicted, self.x)
+            faster = moved > FASTER * self._rate * (target - self.s)
+            if max(
+                corrected * astray, moved * faster
+            ) > NEAR * self.assembly.model.size and not self._leads_back(x, target):
+                outcome = replace(outcome, converged=False, reason="it leads to another branch")
+        predicted.destroy()
+        return outcome
+
+    def _leads_back(self, x: PETSc.Vec, target: float) -> bool:
+        """Whether a step back from a state x at `target` ends at the present state: it does not after a jump."""
+        back = x.copy()
+        self.newton.predict(back, target, self.s)
+        converged = self.newton.solve(self.s, back).converged
+        found = converged and self._distance(back, self.x) <= SAME_STATE * self._distance(x, self.x)
+        back.destroy()
+        self._at_hand = False
+        self.newton.set_pseudo_time(target)
+        return found
+
+    def _distance(self, x: PETSc.Vec, y: PETSc.Vec) -> float:
+        """The largest difference of the components of two states. Collective."""
+        difference = x.copy()
+        difference.axpy(-1.0, y)
+        largest = difference.norm(PETSc.NormType.INFINITY)
+        difference.destroy()
+        return largest
 
     def _note_slope(self, predicted: PETSc.Vec, target: float) -> None:
         """The slope of the path where it begins: the tangent's where ramps are straight, none where they start flat."""
@@ -131,12 +244,15 @@ class LoadPath:
         self._past.set_slope(slope)
         slope.destroy()
 
-    def _accept(self, s: float, x: PETSc.Vec) -> None:
-        """Make x at s the present state and remember it."""
+    def _accept(self, s: float, x: PETSc.Vec, *, branched: bool) -> None:
+        """Make x at s the present state and remember it. branched: it lies on another branch than those before."""
+        turns = s in self.marks.corners or branched
+        self._rate = np.inf if turns else self._distance(x, self.x) / (s - self.s)
         self.x.destroy()
         self.s, self.x = s, x
-        if s in self.corners:
+        if turns:
             self._past.forget()
+            self._step = min(self._step, LONGEST_FIRST_STEP)
         self._past.add(s, x)
 
     def _adapt(self, step: PathStep) -> None:

@@ -1,7 +1,7 @@
 """Equilibrium at one pseudo-time: PETSc's SNES on the free degrees of freedom.
 
-A trial state with det F <= 0 or a non-finite force gives NaN, which the line search answers with a shorter step: such a state
-is never accepted. Convergence: |R| <= tolerance x max(|reactions|, |loads|, rounding floor).
+A trial state with det F <= 0 or a non-finite force gives NaN, which ends a solve by whole steps; a line search answers with a
+shorter one. Such a state is never accepted. Convergence: |R| <= tolerance x max(|reactions|, |loads|, rounding floor).
 """
 
 from __future__ import annotations
@@ -9,19 +9,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.forcing import Forcing
 from ancf_petsc.solve.linear.solver import LinearSolver
-from ancf_petsc.solve.petsc import default_options
+from ancf_petsc.solve.petsc import default_options, is_given
 
 MOST_ITERATIONS = 25
+QUICK, CAREFUL = "basic", "bt"
+"""PETSc's line searches: whole steps of Newton's method; those cut back to where the out-of-balance force falls."""
 PREDICTOR_TERM = 1e-8  # the path's slope is made of it, and extrapolated from
 Reason = PETSc.SNES.ConvergedReason
 WORDS = {
-    Reason.DIVERGED_FNORM_NAN: "the start has det F <= 0 or forces that are not finite",
+    Reason.DIVERGED_FNORM_NAN: "a state with det F <= 0 or forces that are not finite was met",
     Reason.DIVERGED_MAX_IT: f"no convergence in {MOST_ITERATIONS} iterations",
     Reason.DIVERGED_LINE_SEARCH: "no step along Newton's direction lowers the out-of-balance force",
     Reason.DIVERGED_LINEAR_SOLVE: "the linear solver failed",
@@ -49,13 +52,17 @@ class Newton:
         self.matrix = assembly.create_matrix()
         self._external = assembly.external_force(0.0)
         self._residuals: list[float] = []
+        self._shift: NDArray | None = None
         self._supported = (0.0, 0.0)
-        self._snes = self._create()
+        self.can_be_careful = not is_given("snes_linesearch_type") and not is_given("snes_type")
+        self._snes, self._careful = self._create(), self._create()
+        self._careful.setKSP(self._snes.getKSP())
         self.linear = LinearSolver(assembly, self.matrix, self._snes.getKSP())
-        self._snes.setJacobian(self._tangent, self.linear.operator, self.matrix.mat)
         # Preconditioners are renewed by hand, after each tangent: SNES itself does it the first time only.
-        with default_options({"snes_lag_preconditioner": -2}):
-            self._snes.setFromOptions()
+        for snes, search in ((self._careful, CAREFUL), (self._snes, QUICK)):
+            snes.setJacobian(self._tangent, self.linear.operator, self.matrix.mat)
+            with default_options({"snes_lag_preconditioner": -2, "snes_linesearch_type": search}):
+                snes.setFromOptions()
         self.linear.read_options()
         self._predicting = 0
         self._forcing = Forcing(tolerance)
@@ -72,6 +79,7 @@ class Newton:
     def destroy(self) -> None:
         """Free PETSc's objects."""
         self.linear.destroy()
+        self._careful.destroy()
         self._snes.destroy()
         self.matrix.destroy()
 
@@ -87,34 +95,31 @@ class Newton:
         """Loads as they are at s."""
         self._external = self.assembly.external_force(s)
 
-    def solve(self, s: float, x: PETSc.Vec) -> Outcome:
-        """Bring x, whose driven degrees of freedom are those of s, to equilibrium. x is garbage if it fails."""
+    def solve(self, s: float, x: PETSc.Vec, *, careful: bool = False) -> Outcome:
+        """Bring x, whose driven degrees of freedom are those of s, to equilibrium. x is garbage if it fails.
+
+        careful: with a line search that only takes steps which lower the out-of-balance force. Slender bodies have to pass
+        states of a larger one: what bends stretches first.
+        """
+        snes = self._careful if careful else self._snes
         self.set_pseudo_time(s)
         self._residuals = []
         self._forcing.start()
-        self._snes.solve(None, x)
-        reason = self._snes.getConvergedReason()
+        snes.solve(None, x)
+        reason = snes.getConvergedReason()
         before, self._predicting = self._predicting, 0
         return Outcome(
             converged=reason > 0,
             reason=WORDS.get(reason, f"PETSc's reason {reason}"),
-            newton=self._snes.getIterationNumber(),
-            linear=before + self._snes.getLinearSolveIterations(),
+            newton=snes.getIterationNumber(),
+            linear=before + snes.getLinearSolveIterations(),
             residuals=tuple(self._residuals),
         )
 
     def predict(self, x: PETSc.Vec, s: float, target: float) -> bool:
         """Move x from equilibrium at s by the tangent to `target`. Returns whether the linear solve succeeded."""
         assembly = self.assembly
-        increment = assembly.vector()
-        before = x.array_r.copy()
-        assembly.set_driven(x, target)
-        increment.array[:] = x.array_r - before
-        x.array[:] = before
-        rhs = assembly.vector()
-        load = assembly.external_force(target) - assembly.external_force(s)
-        rhs.array[:] = (load - assembly.tangent_product(x, increment)).ravel()
-        rhs.array[assembly.driven] = 0.0
+        rhs, increment = self.push(x, s, target)
         self._term = PREDICTOR_TERM
         self.tangent_at(x)
         ksp = self.linear.ksp
@@ -130,9 +135,35 @@ class Newton:
             vector.destroy()
         return good
 
-    def tangent_at(self, x: PETSc.Vec) -> None:
-        """Make the linear solver ready for the tangent at x. Collective."""
+    def push(self, x: PETSc.Vec, s: float, target: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+        """What drives the free degrees of freedom on from s, by the tangent at x, and the increment of the driven ones."""
+        assembly = self.assembly
+        increment, rhs = assembly.vector(), assembly.vector()
+        before = x.array_r.copy()
+        assembly.set_driven(x, target)
+        increment.array[:] = x.array_r - before
+        x.array[:] = before
+        load = assembly.external_force(target) - assembly.external_force(s)
+        rhs.array[:] = (load - assembly.tangent_product(x, increment)).ravel()
+        rhs.array[assembly.driven] = 0.0
+        return rhs, increment
+
+    def tangent_at(self, x: PETSc.Vec, shift: NDArray | None = None) -> None:
+        """Make the linear solver ready for the tangent at x, a diagonal (3 n,) added to it. Collective."""
+        self._shift = shift
         self._tangent(self._snes, x, self.linear.operator, self.matrix.mat)
+        self._shift = None
+
+    def residual_at(self, x: PETSc.Vec) -> tuple[NDArray, float]:
+        """Out-of-balance force (3 n,) of the free degrees of freedom, nan for a state that cannot be, and over the force
+        scale. Collective.
+        """
+        values = self.assembly.vector()
+        self._residual(self._snes, x, values)
+        scale, norm = self._force_scale(), values.norm()
+        found = values.array_r.copy()
+        values.destroy()
+        return found, norm / scale if scale else 0.0
 
     def out_of_balance(self, x: PETSc.Vec):
         """Q - Q_e (n, 3) on owned nodal vectors at the present pseudo-time: reactions where driven."""
@@ -151,7 +182,11 @@ class Newton:
         f.array[:] = values if smallest > 0.0 else np.nan
 
     def _tangent(self, snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
-        self.assembly.tangent(x, self.matrix)
+        self.matrix.clear()
+        if self._shift is not None:
+            self.matrix.add_diagonal(self._shift)
+        self.assembly.add_tangent(x, self.matrix)
+        self.matrix.finish()
         self.linear.renew_if_tired(x)
         self.linear.ask_for(self._term)
 

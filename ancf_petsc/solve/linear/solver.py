@@ -52,8 +52,8 @@ class LinearSolver:
 
     @property
     def operator(self) -> PETSc.Mat:
-        """What conjugate gradients multiply with."""
-        return self.matrix.mat if self._two_level is None else self._two_level.operator
+        """What vectors are multiplied with: the two levels' own copy of the matrix as long as they see it."""
+        return self.matrix.mat if self._two_level is None or self.direct else self._two_level.operator
 
     def destroy(self) -> None:
         """Free PETSc's objects; one with Python in it that is left to Python's end can crash it."""
@@ -158,6 +158,13 @@ class LinearSolver:
     def is_cheap_to_factor(self) -> bool:
         """Whether factoring is tried at once where an iterative method fails; else shorter steps are tried first."""
         return self.dof <= CHEAP_TO_FACTOR
+
+    def negative_pivots(self) -> int | None:
+        """Of the last factorisation, counted on the way; None where nothing was factored or nobody counted."""
+        pc = self.ksp.getPC()
+        if not self.direct or pc.getType() != "cholesky" or pc.getFactorSolverType() != "mumps":
+            return None
+        return int(pc.getFactorMatrix().getMumpsInfog(12))
 
     def gave_up(self) -> bool:
         """Whether an iterative method failed where a factorisation would go on."""
