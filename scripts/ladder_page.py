@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import limits_page
 import matplotlib as mpl
 
 mpl.use("Agg")
@@ -194,6 +195,9 @@ def write_page() -> Path:
             "",
         ]
         pieces += [_machine(report), "", *lines_of(problem, report)]
+    limits = DOCS / "benchmarks" / limits_page.FILE
+    if limits.is_file():
+        pieces += ["", *limits_page.lines_of(json.loads(limits.read_text()))]
     page = DOCS / "elements.md"
     page.write_text("\n".join(pieces).rstrip() + "\n")
     return page

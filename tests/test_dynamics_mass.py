@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from motion_cases import Followed, body, pendulum
+from family import mesh_of, motion
+from motion_cases import GRAVITY, PROJECT, Followed, body, pendulum
 
+from ancf_petsc import case_from_dict, run
+from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.motion.mass_solver import MassSolver
 
 STILL = {"duration": 1e-3, "outputs": 1, "integrator": "runge_kutta_4", "step": 1e-3}
@@ -68,3 +71,38 @@ def test_the_highest_frequency_is_estimated_on_the_safe_side(kind, exact):
     """Exact values by a dense eigensolver of another program; the estimate is at most 6 % above."""
     omega = looked_at(lambda motion: motion.integrator.highest_frequency, mass=kind)
     assert 1.0 < omega / exact < 1.06
+
+
+@pytest.mark.parametrize("code", list(ELEMENTS))
+@pytest.mark.parametrize("kind", ["consistent", "lumped"])
+def test_a_free_body_falls_as_a_whole(code, kind, tmp_path):
+    """Every position at g and no slope at all: load and mass have the same shares. Rounding of stiff internal forces: 1e-9 g."""
+    g = np.array([0.0, -2.0, -9.81]) if ELEMENTS[code].components == 3 else np.array([1.0, 0.0, -9.81])
+
+    def look(motion):
+        model, x = motion.assembly.model, motion.integrator.x
+        return motion.equations.acceleration(0.0, x, np.zeros((model.owned, 3))), model.own_positions
+
+    mesh = mesh_of("pendulum", code, (2, 1, 1), tmp_path)
+    section = {"2": {"thickness": 0.1, "plane": "stress"}, "1": {"area": 1e-2, "inertia": 1e-5}}.get(code[0])
+    data = motion(mesh, code, 1e-6, step=1e-6, mass=kind)
+    data["load"][0]["acceleration"] = g.tolist()
+    del data["constraint"], data["probe"]
+    data |= {"section": section} if section else {}
+    accelerations, positions = Followed(data, look).rows[0]
+    found = np.zeros((len(accelerations), 3))
+    found[positions] = g
+    np.testing.assert_allclose(accelerations, found, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["energy_momentum", "runge_kutta_5dp", "central_difference"])
+def test_work_of_a_load_that_does_not_start_from_nothing(name, tmp_path):
+    """A ramp from one half, with a corner: the balance closes, to 1e-9 of the work where the method keeps it exactly."""
+    how = {"energy_momentum": 5e-3, "central_difference": 2e-4}
+    dynamics = {"duration": 0.2, "outputs": 7, "integrator": name}
+    dynamics |= {"step": how[name]} if name in how else {"tolerance": 1e-8}
+    load = {**GRAVITY, "ramp": [[0, 0.5], [0.43, 1], [1, 0.2]]}
+    curve = run(case_from_dict(pendulum(dynamics, load=[load]), PROJECT), tmp_path / "run").curve
+    allowed = {"energy_momentum": 1e-9, "runge_kutta_5dp": 1e-8, "central_difference": 3e-6}[name]
+    assert curve["external_work"][-1] > 10.0
+    assert np.abs(curve["energy_drift"]).max() < allowed * curve["external_work"][-1]

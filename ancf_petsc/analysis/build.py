@@ -16,7 +16,6 @@ from ancf_petsc.kernel.choice import kernel_set
 from ancf_petsc.model.body import Body
 from ancf_petsc.model.load import Load
 from ancf_petsc.model.model import Model
-from ancf_petsc.model.ramp import make_ramp
 from ancf_petsc.parallel.exchange import agree, on_root
 from ancf_petsc.parallel.numbering import Numbering, distribute, with_vectors
 from ancf_petsc.parallel.root import FromRoot
@@ -24,6 +23,7 @@ from ancf_petsc.plan.curve import CurveChoice
 from ancf_petsc.plan.loads import KINDS
 from ancf_petsc.plan.materials import regions
 from ancf_petsc.plan.plan import Plan, make_plan
+from ancf_petsc.plan.ramps import Ramps
 from ancf_petsc.plan.space import nearby_origin
 
 
@@ -105,6 +105,7 @@ def _make_body(case: Case, root: FromRoot[Plan]) -> Body:
         regions=regions(spec, row, material, numbering.own_cells),
         size=root.value(lambda plan: plan.mesh.size),
         cell_numbers=cell_numbers,
+        lumped=spec.dynamics is not None and spec.dynamics.mass == "lumped",
     )
 
 
@@ -140,9 +141,9 @@ class _Rows:
 def _loads(case: Case, body: Body, rows: _Rows) -> list[Load]:
     """This rank's share of all loads."""
     entered = rows.owned(lambda plan: plan.loads)
-    default = "linear" if case.spec.statics else "constant"
+    ramps = Ramps(case.spec, case.file)
     return [
-        KINDS[spec.type].share(spec, body, entered.get(number), make_ramp(spec.ramp, default))
+        KINDS[spec.type].share(spec, body, entered.get(number), ramps.of_load(spec.ramp))
         for number, spec in enumerate(case.spec.load)
     ]
 

@@ -21,6 +21,7 @@ from ancf_petsc.model.mass import Mass
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.integration import warn_of_long_step
 from ancf_petsc.motion.integrators import Settings, integrator, steps_in
+from ancf_petsc.plan.outputs import motion_times
 
 log = logging.getLogger("ancf")
 
@@ -36,8 +37,8 @@ class MotionAnalysis:
         self.comm = self.assembly.comm
         self.mass = Mass(self.assembly, lumped=spec.mass == "lumped")
         self.damping = damping_of(case, self.assembly, self.mass)
-        self.equations = Equations(self.assembly, self.mass, self.damping.alpha, spec.duration)
-        self.times = [spec.duration * k / spec.outputs for k in range(1, spec.outputs + 1)]
+        self.times = motion_times(spec)
+        self.equations = Equations(self.assembly, self.mass, self.damping.alpha, spec.duration, self.times)
         x, v = self.assembly.reference_vector(), self.assembly.vector()
         set_velocity(v, self.mass, case.spec.initial or InitialSpec())
         self.equations.place(x, v, 0.0)
@@ -53,7 +54,7 @@ class MotionAnalysis:
         """
         spec, interval = self.spec, self.spec.duration / self.spec.outputs
         if spec.step is None:
-            return Settings(0.0, spec.tolerance or 0.0, spec.option)
+            return Settings(0.0, interval, spec.tolerance or 0.0, spec.option)
         size = interval / steps_in(interval, spec.step)
         if abs(size - spec.step) > 1e-9 * spec.step:
             log.info(
@@ -63,7 +64,7 @@ class MotionAnalysis:
                 round(interval / size),
                 interval,
             )
-        return Settings(size, 0.0, spec.option)
+        return Settings(size, interval, 0.0, spec.option)
 
     def prepare(self) -> None:
         """Set the solvers up, so that every option has been asked for."""

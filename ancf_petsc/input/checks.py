@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 from pydantic import ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
@@ -13,6 +14,8 @@ from ancf_petsc.input.schema import CaseSpec, ConstraintSpec, laws
 from ancf_petsc.input.types import Direction, Ramp, problem
 
 Problems = Iterator[PydanticCustomError]
+JUMP = 3e-9
+"""Rows of a ramp closer than this part of the interval of outputs may fall on one point of time."""
 
 
 def check(spec: CaseSpec) -> None:
@@ -29,8 +32,7 @@ def problems(spec: CaseSpec) -> list[PydanticCustomError]:
     """All that is wrong between the tables, the most basic first."""
     checks = (
         *(_one_analysis, _materials, _densities, _unions, _probes, _motion, _strokes, _arc_length, _section),
-        _held_slopes,
-        _options,
+        *(_held_slopes, _ramps, _options),
     )
     return [found for check in checks for found in check(spec)]
 
@@ -134,6 +136,27 @@ def _motion(spec: CaseSpec) -> Problems:
                 got=ramp,
                 expected="a ramp from 0",
                 cure='such as "cosine"',
+            )
+
+
+def _ramps(spec: CaseSpec) -> Problems:
+    """Rows of a ramp that rounding could make one would be a jump."""
+    statics, dynamics = spec.statics, spec.dynamics
+    outputs = dynamics.outputs if dynamics else 1
+    if statics:
+        outputs = statics.steps or len(statics.times or statics.strokes or (1,))
+    entries = [("constraint", index, row.ramp) for index, row in enumerate(spec.constraint)]
+    entries += [("load", index, row.ramp) for index, row in enumerate(spec.load)]
+    for table, index, ramp in entries:
+        s = () if isinstance(ramp, str) else [s for s, _ in ramp]
+        close = next((pair for pair in pairwise(s) if pair[1] - pair[0] <= JUMP / outputs), None)
+        if close:
+            yield problem(
+                f"the rows at s = {close[0]!r} and {close[1]!r} are a jump",
+                at=[table, index, "ramp"],
+                got=ramp,
+                expected=f"rows farther apart than {JUMP:g} of an interval of outputs",
+                cure="drop one of them, or let the ramp rise over a longer part",
             )
 
 

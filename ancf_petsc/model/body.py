@@ -53,7 +53,8 @@ class Body:
     reference (v, 3): nodal vectors of the undeformed body, positions from `origin`. slots (v,): 0 for a position, j for the
     j-th slope of its node, which follows the position j places behind. Slopes are multiplied by lengths.
     tables: the cells as every kernel takes them, see `kernel/choice`; they have nodes (e, a) and volumes (e,).
-    size: diagonal of the box around the body. cell_numbers: (e,) number of each cell in the mesh file.
+    size: diagonal of the box around the body. cell_numbers: (e,) number of each cell in the mesh file. lumped: whether mass, and
+    what gravity pulls at, are those of a diagonal matrix.
     """
 
     comm: MPI.Comm
@@ -66,6 +67,7 @@ class Body:
     regions: tuple[Region, ...]
     size: float
     cell_numbers: NDArray[np.int64]
+    lumped: bool
 
     @property
     def owned(self) -> int:

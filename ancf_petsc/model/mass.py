@@ -112,3 +112,9 @@ def mean_products(element: Element) -> NDArray[np.float64]:
     tables = element.tables("mass")
     weights = tables.weights / tables.weights.sum()
     return np.einsum("q,qa,qb->ab", weights, tables.values, tables.values)
+
+
+def lumped_shares(element: Element) -> NDArray[np.float64]:
+    """Part of a cell's mass that the lumped matrix gives to each position (a,), 0 for slopes."""
+    diagonal = np.where(element.slot == 0, np.diag(mean_products(element)), 0.0)
+    return diagonal / diagonal.sum()

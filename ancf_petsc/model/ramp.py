@@ -5,8 +5,13 @@ In motion s is time over duration. `cosine` is the mended Eq. (17) of Olshevskiy
 
 from __future__ import annotations
 
+from bisect import bisect, insort
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import acos, cos, pi, sin
+
+CLOSE = 1e-9
+"""Points of pseudo-time closer than this part of the interval of outputs differ by rounding: they are one."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,10 @@ class Ramp:
                 return s0 + (s1 - s0) * (factor - f0) / (f1 - f0)
         return None
 
+    def moved(self, places: Mapping[float, float]) -> Ramp:
+        """The ramp with the corners of its table at their `places`."""
+        return Ramp(self.kind, tuple((places[s], factor) for s, factor in self.table))
+
     def _interpolate(self, s: float) -> float:
         if s <= self.table[0][0]:
             return self.table[0][1]
@@ -67,6 +76,33 @@ class Ramp:
             if s <= s1:
                 return f0 + (f1 - f0) * (s - s0) / (s1 - s0)
         return self.table[-1][1]
+
+
+def merged(points: Iterable[float], tolerance: float) -> list[float]:
+    """Ascending points above 0; of those within the tolerance of each other the last."""
+    kept: list[float] = []
+    for point in sorted(points):
+        if kept and point - kept[-1] <= tolerance:
+            kept[-1] = point
+        elif point > tolerance:
+            kept.append(point)
+    return kept
+
+
+def nearest_points(corners: Iterable[float], points: Iterable[float], tolerance: float) -> dict[float, float]:
+    """Where each of the corners of ramps is put: on a point, 0, 1 or another corner that is within the tolerance, or where it is.
+
+    Without this a step would lead from a point to its double, over what rounding makes of their difference.
+    """
+    known = sorted({0.0, 1.0, *points})
+    places = {}
+    for s in sorted(set(corners)):
+        k = bisect(known, s)
+        places[s] = min(known[max(k - 1, 0) : k + 1], key=lambda point: abs(point - s))
+        if abs(places[s] - s) > tolerance:
+            places[s] = s
+            insort(known, s)
+    return places
 
 
 def make_ramp(given: str | tuple | list | None, default: str) -> Ramp:

@@ -6,6 +6,9 @@ jumps, and with the consistent mass the free nodes beside them get their share o
 
 from __future__ import annotations
 
+from bisect import bisect
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -17,9 +20,14 @@ from ancf_petsc.parallel.exchange import combined
 
 
 class Equations:
-    """Forces and accelerations of a body in motion. damping: alpha in 1 / unit of time."""
+    """Forces and accelerations of a body in motion. damping: alpha in 1 / unit of time.
 
-    def __init__(self, assembly: Assembly, mass: Mass, damping: float, duration: float) -> None:
+    outputs: times that a ramp's corner at the same s is passed at. corners: times of all corners, ascending.
+    """
+
+    def __init__(
+        self, assembly: Assembly, mass: Mass, damping: float, duration: float, outputs: Sequence[float] = ()
+    ) -> None:
         self.assembly = assembly
         self.comm = assembly.comm
         self.mass = mass
@@ -28,11 +36,13 @@ class Equations:
         self.solver = MassSolver(mass)
         model = assembly.model
         self.is_driven = any(drive.amplitude for drive in model.drives)
-        self.corners = sorted(
-            {s * duration for drive in model.drives if drive.amplitude for s in drive.ramp.corners()}
-            | {s * duration for load in model.loads for s in load.ramp.corners()}
-        )
-        self._piece_end = self._end_of_piece(0.0)
+        ramps = [drive.ramp for drive in model.drives if drive.amplitude]
+        ramps += [load.ramp for load in model.loads]
+        # Times and pseudo-times side by side: t / duration may be an ulp before a corner's s, where the rate is another.
+        self._knots = [0.0, *sorted({s for ramp in ramps for s in ramp.corners()}), 1.0]
+        times = {time / duration: time for time in outputs}
+        self.corners = [times.get(s, s * duration) for s in self._knots[1:-1]]
+        self._piece = 0
         self._steady = all(load.ramp.kind == "constant" for load in model.loads)
         self._loads = assembly.external_force(0.0)
 
@@ -50,13 +60,13 @@ class Equations:
 
     def driven_velocities(self, t: float) -> NDArray[np.float64]:
         """Of the driven degrees of freedom (c,); at the end of a smooth piece those it ends with."""
-        s = min(t / self.duration, self._piece_end)
+        s = self._within_piece(t)
         rates = [drive.amplitude * drive.ramp.rate(s) / self.duration for drive in self.assembly.model.drives]
         return np.array(rates or [0.0])[self.assembly.driven_by]
 
     def driven_accelerations(self, t: float) -> NDArray[np.float64]:
         """Of the driven degrees of freedom (c,)."""
-        s = min(t / self.duration, self._piece_end)
+        s = self._within_piece(t)
         rates = [
             drive.amplitude * drive.ramp.curvature(s) / self.duration**2
             for drive in self.assembly.model.drives
@@ -74,23 +84,22 @@ class Equations:
         """Enter the smooth piece after t. Velocities of driven nodes may jump: v then holds those after the
         impulse.
         """
+        before = self.driven_velocities(t)
+        self._piece = bisect(self.corners, t)
         if not self.is_driven:
-            self._piece_end = self._end_of_piece(t)
             return
         driven = self.assembly.driven
         jump = np.zeros((self.assembly.model.owned, 3))
-        before = self.driven_velocities(t)
-        self._piece_end = self._end_of_piece(t)
         jump.ravel()[driven] = self.driven_velocities(t) - before
         if not combined(self.comm, float(np.abs(jump).max(initial=0.0))):
             return
         change = jump - self.solver.solve(self.mass.times(jump))
         v.array[:] += change.ravel()
 
-    def _end_of_piece(self, t: float) -> float:
-        """The last s before the next corner."""
-        ahead = next((corner for corner in self.corners if corner > t), self.duration)
-        return float(np.nextafter(ahead / self.duration, 0.0))
+    def _within_piece(self, t: float) -> float:
+        """The s of a time, from the corner passed last to just before the next."""
+        begin, end = self._knots[self._piece : self._piece + 2]
+        return min(max(t / self.duration, begin), float(np.nextafter(end, 0.0)))
 
     # --- what follows
 

@@ -69,7 +69,7 @@ class TimeIntegration:
             now.copy(kept)
         start, carried = integrator.time, integrator.a
         try:
-            step = integrator.advance(goal)
+            step = integrator.step_to(goal)
             if not isfinite(integrator.x.norm() + integrator.v.norm(PETSc.NormType.INFINITY) ** 2):
                 reached, integrator.time = integrator.time, start
                 raise integrator.failed(reached, "numbers are not finite any more")

@@ -1,4 +1,4 @@
-"""When a static case writes: steps, times or strokes as pseudo-times."""
+"""When a case writes: times of a motion; steps, times or strokes of statics as pseudo-times."""
 
 from __future__ import annotations
 
@@ -6,20 +6,31 @@ from pathlib import Path
 from typing import Any
 
 from ancf_petsc.errors import CaseError
+from ancf_petsc.input.analysis import DynamicsSpec
 from ancf_petsc.input.schema import CaseSpec
-from ancf_petsc.model.ramp import make_ramp
+from ancf_petsc.model.ramp import CLOSE, make_ramp, merged
 
 
 def output_times(spec: CaseSpec, file: Path | None = None) -> list[float]:
     """Pseudo-times of the outputs of a static case, ascending, the last is 1."""
     statics = spec.statics
     assert statics is not None
-    if statics.times:
-        return sorted({*statics.times, 1.0})
-    if statics.strokes:
-        return sorted({*_stroke_times(spec, statics.strokes, file), 1.0})
-    assert statics.steps
-    return [k / statics.steps for k in range(1, statics.steps + 1)]
+    if statics.steps:
+        return [k / statics.steps for k in range(1, statics.steps + 1)]
+    times = statics.times or _stroke_times(spec, statics.strokes or (), file)
+    return merged((*times, 1.0), CLOSE / max(1, len(times)))
+
+
+def motion_times(spec: DynamicsSpec) -> list[float]:
+    """Times of the outputs of a motion, ascending; the start is none of them."""
+    return [spec.duration * k / spec.outputs for k in range(1, spec.outputs + 1)]
+
+
+def output_points(spec: CaseSpec, file: Path | None = None) -> list[float]:
+    """Pseudo-times of the outputs of any case, ascending, the last is 1."""
+    if spec.dynamics is None:
+        return output_times(spec, file)
+    return [time / spec.dynamics.duration for time in motion_times(spec.dynamics)]
 
 
 def _stroke_times(spec: CaseSpec, strokes: tuple[float, ...], file: Path | None) -> list[float]:

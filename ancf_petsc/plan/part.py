@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ancf_petsc.axes import AXES
 from ancf_petsc.element.element import Element
-from ancf_petsc.errors import CaseError
 from ancf_petsc.input.load import Case
 from ancf_petsc.input.schema import CaseSpec
 from ancf_petsc.mesh.groups import find_group
 from ancf_petsc.mesh.mesh import Group, Mesh
+from ancf_petsc.plan.plane import plane_normal
+from ancf_petsc.plan.ramps import Ramps
 from ancf_petsc.plan.space import Space
 
 Floats = NDArray[np.float64]
@@ -25,7 +25,7 @@ class Part:
 
     Today one part, on the root rank, is all of the mesh. Entries speak of a part nevertheless, and of sums over all parts
     (`total`), so that none of them stands in the way of reading and planning on every rank. normal: the axis that a plane body
-    does not move along, None for a body in space.
+    does not move along, None for a body in space. ramps: makes those of the case.
     """
 
     def __init__(self, case: Case, mesh: Mesh, element: Element) -> None:
@@ -33,7 +33,8 @@ class Part:
         self.spec: CaseSpec = case.spec
         self.mesh, self.element = mesh, element
         self.space = Space(mesh, element)
-        self.normal = self._normal()
+        self.normal = plane_normal(self.space, case.spec, self._nodes_of, case.file)
+        self.ramps = Ramps(case.spec, case.file)
 
     @property
     def vectors(self) -> int:
@@ -43,6 +44,9 @@ class Part:
     def group(self, name: str, key: str) -> Group:
         """A group of the case. Raises CaseError that names the key."""
         return find_group(self.mesh, name, key, self.file)
+
+    def _nodes_of(self, name: str, key: str) -> Integers:
+        return self.group(name, key).nodes
 
     def positions(self, group: Group) -> Integers:
         """The nodal vectors that are positions of a group's nodes."""
@@ -61,22 +65,3 @@ class Part:
     def total(self, number: float) -> float:
         """The sum of a number over all parts."""
         return number
-
-    def _normal(self) -> int | None:
-        """Of a straight beam it is an axis that the case does not speak of."""
-        if self.element.components == 3:
-            return None
-        flat = [i for i in range(3) if np.abs(self.space.axes[i]).max() < 1e-9]
-        if not flat:
-            raise CaseError(
-                "the beam lies along no plane of the axes",
-                file=self.file,
-                key="mesh.file",
-                expected="a line in a plane x-y, y-z or z-x",
-                cure="turn the mesh",
-            )
-        vectors = [load.vector for load in self.spec.load]
-        vectors += [self.spec.initial.velocity] if self.spec.initial else []
-        used = {i for vector in vectors for i in range(3) if vector[i]}
-        used |= {AXES.index(axis) for spec in self.spec.constraint for axis in (*spec.move, *spec.slopes)}
-        return next((i for i in reversed(flat) if i not in used), flat[-1])

@@ -22,6 +22,7 @@ from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.mesh.read import read_mesh
 from ancf_petsc.plan.curve import CurveChoice, choose_curve, enter_stroke
 from ancf_petsc.plan.loads import enter_loads
+from ancf_petsc.plan.locking import locking_notes
 from ancf_petsc.plan.materials import enter_materials
 from ancf_petsc.plan.part import Part
 from ancf_petsc.plan.probes import enter_probes
@@ -71,6 +72,7 @@ def plan_on(case: Case, mesh: Mesh) -> Plan:
         error.file = case.file
         raise
     complete(mesh, row)
+    mesh.notes.extend(locking_notes(spec))
     chosen = {name: group.model_dump(exclude_none=True) for name, group in spec.groups.items()}
     mesh.groups |= choose_groups(mesh, chosen, file=case.file)
     part = Part(case, mesh, row)

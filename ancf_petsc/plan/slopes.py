@@ -6,6 +6,9 @@ it is too; on a line that of the slope along it; in a volume that of all slopes;
 Constraints live in indices: the slopes of a node are taken along three perpendicular directions such that each prescribed
 slope is one of them. They are the axes wherever that will do. Where no such directions exist (planes at odd angles hold different
 components), all slopes of the component are held.
+
+On a plane of symmetry the deformation gradient is that of its mirror image, so the tangential components of the slope across
+the plane vanish as well; `plan/symmetry` finds these planes.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ancf_petsc.plan.space import Space
+from ancf_petsc.plan.symmetry import Mirror
 
 Floats = NDArray[np.float64]
 FLAT = 1e-8
@@ -27,12 +31,12 @@ Parts = dict[int, NDArray[np.int64]]
 
 
 def prescribed_slopes(
-    space: Space, supports: Iterable[tuple[set[int], Parts]]
+    space: Space, supports: Iterable[tuple[set[int], Parts]], mirrors: Iterable[Mirror] = ()
 ) -> tuple[NDArray[np.bool_], int]:
     """Rotate the frames of `space` where needed. Returns (v, 3), whether a component of a slope is prescribed, and at how many
     nodes all slopes of a component are held for want of a frame.
 
-    supports: components prescribed on parts (dimension -> corners (m, c), indices of points).
+    supports: components prescribed on parts (dimension -> corners (m, c), indices of points). mirrors: planes of symmetry.
     """
     d = space.axes.shape[1]
     tangents = np.zeros((len(space.nodes), 3, 3, 3))
@@ -40,6 +44,9 @@ def prescribed_slopes(
         for dimension, corners in parts.items():
             if dimension:
                 _add_projectors(space, tangents, sorted(components), dimension, corners)
+    for mirror in mirrors:
+        for component in {0, 1, 2} - {mirror.normal}:
+            tangents[space.compact[mirror.nodes], component, mirror.normal, mirror.normal] += 1.0
     nodes = np.flatnonzero(tangents.any(axis=(1, 2, 3)) & (np.diff(space.first) > 1))
     held = np.zeros((space.vectors, 3), bool)
     if not len(nodes):

@@ -17,6 +17,7 @@ from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.fused import FusedMotion, fused_motion
 
 SHORTEST = 1e-13  # of the duration: a step so short does not move the clock reliably
+TINY = 0.9e-9  # of the usual step: increments so small are rounding, and velocities made of them are wrong
 
 
 def steps_in(interval: float, step: float) -> int:
@@ -26,9 +27,11 @@ def steps_in(interval: float, step: float) -> int:
 
 @dataclass(frozen=True)
 class Settings:
-    """What a case may set. step: 0 where the method chooses its steps by `tolerance`. option: of the method's own key."""
+    """What a case may set. step: 0 where the method chooses its steps by `tolerance`. interval: of the outputs. option: of the
+    method's own key."""
 
     step: float = 0.0
+    interval: float = 0.0
     tolerance: float = 0.0
     option: float = 0.0
 
@@ -93,6 +96,26 @@ class Integrator(ABC):
     def longest_stable(self) -> float | None:
         """The longest stable fixed step of an explicit method; None for implicit ones."""
         return None
+
+    @property
+    def usual_step(self) -> float:
+        """What a step is compared with: the one asked for, or the interval of outputs."""
+        return self.settings.step or self.settings.interval
+
+    @property
+    def reach(self) -> float:
+        """A goal closer than this is reached: what is left is rounding. No step is as short."""
+        return max(SHORTEST * self.equations.duration, TINY * self.usual_step)
+
+    def step_to(self, goal: float) -> Step:
+        """`advance` that refuses to go a rounding error far. Raises MotionStopped."""
+        left = goal - self.time
+        if left <= TINY * self.usual_step:
+            raise MotionStopped(
+                f"{self.name} refuses to step from time {self.time:.6g} by {left:.3g}, {left / self.usual_step:.1g} of the "
+                "usual step: two time points of the case differ by rounding; take another dynamics.outputs and report it"
+            )
+        return self.advance(goal)
 
     @abstractmethod
     def advance(self, goal: float) -> Step:

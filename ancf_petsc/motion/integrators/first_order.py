@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.motion.equations import Equations
-from ancf_petsc.motion.integrators.base import SHORTEST, Integrator, Settings, Step
+from ancf_petsc.motion.integrators.base import Integrator, Settings, Step
 
 NOT_FINITE = 72  # PETSC_ERR_FP
 SPEED_CHANGE = 1.1  # a largest speed grown by this factor widens the tolerance of velocities
@@ -61,10 +61,10 @@ class FirstOrder(Integrator):
         if self.ts.getConvergedReason() < 0:
             raise self.failed(goal, "Newton does not converge or no step is short enough")
         before, now = self.time, self.ts.getTime()
-        if abs(now - goal) <= SHORTEST * self.equations.duration:
+        if abs(now - goal) <= self.reach:
             now = goal
             self.ts.setTime(goal)
-        if now - before <= SHORTEST * self.equations.duration:
+        if now - before <= self.reach:
             raise self.failed(goal, "steps have become too short to move on")
         self.time = now
         self._store()

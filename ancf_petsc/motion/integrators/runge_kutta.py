@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from ancf_petsc.kernel.adaptive import NOT_FINITE, TOO_SHORT
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.fused import FusedMotion
-from ancf_petsc.motion.integrators.base import SHORTEST, Settings, Step
+from ancf_petsc.motion.integrators.base import Settings, Step
 from ancf_petsc.motion.integrators.first_order import SPEED_CHANGE, FirstOrder
 from ancf_petsc.solve.petsc import begins_a_given_option, default_options
 
@@ -44,7 +44,7 @@ class RungeKutta5dp(FirstOrder):
     def _leap(self, goal: float, fused: FusedMotion) -> Step:
         tolerance, before = self.settings.tolerance, self.time
         position = tolerance * self.equations.assembly.model.size
-        span = (self.time, goal, SHORTEST * self.equations.duration)
+        span = (self.time, goal, self.reach)
         done = fused.leap(
             self.y.array, span, (self._proposed, self._speed, position, tolerance, SPEED_CHANGE)
         )

@@ -13,7 +13,8 @@ from ancf_petsc.mesh.groups import parts_for_support
 from ancf_petsc.mesh.mesh import Group
 from ancf_petsc.model.drive import HELD, Drive
 from ancf_petsc.plan.part import Part
-from ancf_petsc.plan.slopes import Parts, prescribed_slopes
+from ancf_petsc.plan.slopes import prescribed_slopes
+from ancf_petsc.plan.supports.mirrors import Prescribed, mirrors_of
 
 
 class SupportTable:
@@ -28,7 +29,7 @@ class SupportTable:
         self.drives: list[Drive] = []
         self._groups: list[str] = []
         self._source = np.full((part.vectors, 3), -1, np.int32)
-        self._surfaces: list[tuple[set[int], Parts]] = []
+        self._prescribed: list[Prescribed] = []
         self._held: list[tuple[NDArray[np.int64], int]] = []
 
     def prescribe(self, group: Group, drives: Mapping[int, Drive]) -> None:
@@ -48,14 +49,16 @@ class SupportTable:
             self.drive[vectors, axis] = index
             self._source[vectors, axis] = len(self._groups) - 1
         if self.part.element.has_slopes:
-            self._surfaces.append((set(drives), parts_for_support(self.part.mesh, group)))
+            parts = parts_for_support(self.part.mesh, group)
+            self._prescribed.append(Prescribed(group.name, dict(drives), parts))
 
     def hold(self, vectors: NDArray[np.int64], axis: int) -> None:
         """Hold a component of nodal vectors where nothing else drives it, once all supports are known."""
         self._held.append((vectors, axis))
 
     def finish(self) -> None:
-        """Hold the slopes along surfaces and lines whose positions are prescribed, and what else is to be held."""
+        """Hold the slopes along surfaces and lines whose positions are prescribed, those across planes of symmetry, and what else
+        is to be held."""
         if self.part.element.has_slopes:
             self._hold_slopes_along_surfaces()
         for vectors, axis in self._held:
@@ -64,7 +67,9 @@ class SupportTable:
             self._hold(np.arange(self.part.vectors), self.part.normal)
 
     def _hold_slopes_along_surfaces(self) -> None:
-        held, odd = prescribed_slopes(self.part.space, self._surfaces)
+        surfaces = [(set(drives), parts) for _, drives, parts in self._prescribed]
+        mirrors = mirrors_of(self.part, self._prescribed)
+        held, odd = prescribed_slopes(self.part.space, surfaces, mirrors)
         for axis in range(3):
             self._hold(np.flatnonzero(held[:, axis]), axis)
         if odd:
