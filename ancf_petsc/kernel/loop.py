@@ -2,12 +2,12 @@
 
 A kernel is a layout of cells with what happens at a point and at the end of a cell. All of them are compiled into the loop:
 
-    states = geometry.states(fields, cells)                        where nodal vectors of a cell are gathered
+    states = gather.states(fields, cells)                        where nodal vectors of a cell are gathered
     sums = action.sums(cells, out)                                 what points add to
     for e in cells:
-        frame = geometry.enter(e, fields, cells, states)           gathers; what all points of the cell share
+        frame = gather.enter(e, fields, cells, states)           gathers; what all points of the cell share
         for q in points:
-            at = geometry.place(frame, cells, q)                   the point
+            at = gather.place(frame, cells, q)                   the point
             seen = action.point(at, states, parameters, sums, seen)
         action.close(frame, cells, parameters, sums, out)          gives the sums away, leaves them zero
 
@@ -25,7 +25,7 @@ from ancf_petsc.kernel.interface import Kernel, Means, Span, Target
 from ancf_petsc.material.tensor import inlined
 
 
-class Geometry(NamedTuple):
+class Gather(NamedTuple):
     """How a number of nodal fields is brought to the points of a layout of cells; see the head of the module."""
 
     states: Callable
@@ -44,9 +44,9 @@ class Action(NamedTuple):
     start: float = 0.0
 
 
-def loop(geometry: Geometry, action: Action) -> Callable:
+def loop(gather: Gather, action: Action) -> Callable:
     """The loop of one kernel, to be compiled into others."""
-    states_of, enter, points, place = geometry
+    states_of, enter, points, place = gather
     point, sums_of, close, _, start = action
 
     @composed
@@ -63,12 +63,12 @@ def loop(geometry: Geometry, action: Action) -> Callable:
     return visit
 
 
-def compiled(geometry: Geometry, action: Action, named_cells: Callable) -> Kernel:
+def compiled(gather: Gather, action: Action, named_cells: Callable) -> Kernel:
     """The compiled loop of one kernel; see `interface` for its arguments.
 
     Plain tuples cross the border to compiled code: checking named ones there takes microseconds a call.
     """
-    visit, named_out = loop(geometry, action), action.named
+    visit, named_out = loop(gather, action), action.named
 
     def of_plain_tuples(fields, cells, parameters, span, out):
         return visit(fields, named_cells(cells), parameters, Span(*span), named_out(out))

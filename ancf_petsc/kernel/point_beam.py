@@ -278,8 +278,8 @@ def mean_tangent_at(at, states, parameters, sums, seen):
     return seen
 
 
-def _made(geometry, action):
-    return compiled(geometry, action, scatter.named_cells)
+def _made(gather, action):
+    return compiled(gather, action, scatter.named_cells)
 
 
 @cache

@@ -15,7 +15,7 @@ from ancf_petsc.kernel import scatter
 from ancf_petsc.kernel.interface import Kernel, Kernels
 from ancf_petsc.kernel.loop import (
     Action,
-    Geometry,
+    Gather,
     as_given,
     compiled,
     named_means,
@@ -43,8 +43,8 @@ class Solid(NamedTuple):
     """
 
     named_cells: Callable
-    one: Geometry
-    two: Geometry
+    one: Gather
+    two: Gather
     deformation: Callable
     gradient: Callable
     add_stress: Callable
@@ -60,8 +60,8 @@ class Solid(NamedTuple):
 def solid_kernels(law: Law, solid: Solid) -> Kernels:
     """The kernels of a layout for one law."""
 
-    def made(geometry: Geometry, action: Action) -> Kernel:
-        return compiled(geometry, action, solid.named_cells)
+    def made(gather: Gather, action: Action) -> Kernel:
+        return compiled(gather, action, solid.named_cells)
 
     forces = (solid.force_sums, solid.close, as_given)
     in_place = (sums_in_place, nothing_to_close)

@@ -13,7 +13,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from ancf_petsc.kernel.interface import Cells
-from ancf_petsc.kernel.loop import Geometry
+from ancf_petsc.kernel.loop import Gather
 from ancf_petsc.material.tensor import inlined, transpose
 
 Nine = tuple[float, float, float, float, float, float, float, float, float]
@@ -122,8 +122,8 @@ def place(frame, cells, q):
     return At(frame, cells.gradients[q], cells.fractions[q], cells.fractions[q] * frame.volume)
 
 
-ONE = Geometry(one_state, enter_one, points, place)
-TWO = Geometry(two_states, enter_two, points, place)
+ONE = Gather(one_state, enter_one, points, place)
+TWO = Gather(two_states, enter_two, points, place)
 
 
 # --- scatter

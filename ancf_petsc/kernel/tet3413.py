@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ancf_petsc.jit import composed, kernel
 from ancf_petsc.kernel.interface import Floats, Kernels
-from ancf_petsc.kernel.loop import Action, Geometry, named_target, nothing_to_close, sums_in_place
+from ancf_petsc.kernel.loop import Action, Gather, named_target, nothing_to_close, sums_in_place
 from ancf_petsc.kernel.point_solid import Solid, solid_kernels
 from ancf_petsc.kernel.scatter import add_pair, add_whole
 from ancf_petsc.material.models import Law
@@ -49,7 +49,7 @@ class Tetrahedron(NamedTuple):
     G: Any
 
 
-class At(NamedTuple):
+class AtTetrahedron(NamedTuple):
     """Its point."""
 
     frame: Tetrahedron
@@ -81,7 +81,7 @@ def one_point(cells):
 
 @inlined
 def place(frame, cells, q):
-    return At(frame, cells.volumes[frame.e])
+    return AtTetrahedron(frame, cells.volumes[frame.e])
 
 
 @inlined
@@ -249,7 +249,7 @@ def _mean_tangent(law: Law) -> Action:
     return Action(mean_tangent_at, sums_in_place, nothing_to_close, named_target)
 
 
-GEOMETRY = Geometry(fields_themselves, enter, one_point, place)
+GEOMETRY = Gather(fields_themselves, enter, one_point, place)
 SOLID = Solid(
     named_cells=named_cells,
     one=GEOMETRY,
