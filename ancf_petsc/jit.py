@@ -22,8 +22,11 @@ from typing import Any
 
 import numba
 import numpy
+from llvmlite import ir
+from numba import types
 from numba.core.dispatcher import Dispatcher
-from numba.extending import register_jitable
+from numba.core.typing.templates import Signature
+from numba.extending import intrinsic, overload, register_jitable
 
 PACKAGE = Path(__file__).parent
 SOURCES = ("algebra", "kernel", "material")
@@ -76,6 +79,52 @@ def composed(function: Callable) -> Callable:
     if named is function:
         register_jitable(forceinline=True)(function)
     return named
+
+
+def address_of(function: Callable, signature: Signature) -> int:
+    """Where the machine code of a function for these types begins: what `call_at` takes.
+
+    A compiled loop that is given an address need not be compiled anew for every function it may call.
+    """
+    named = _named(function)
+    key = (named, signature)
+    if key not in _ADDRESSES:
+        if numba.config.DISABLE_JIT:
+            address = id(named)
+        else:
+            options = {"error_model": "numpy", "fastmath": {"contract"}}
+            code = numba.cfunc(signature, cache=True, **options)(named)
+            _ADDRESSES[code] = address = code.address
+        _ADDRESSES[key] = address
+        _BEHIND[address] = named
+    return _ADDRESSES[key]
+
+
+_ADDRESSES: dict[Any, int] = {}
+_BEHIND: dict[int, Callable] = {}
+
+
+def call_at(address: int, *arguments: Any) -> float:
+    """Call what lies at an address of `address_of`, with arguments of its signature. It returns a float."""
+    return _BEHIND[address](*arguments)
+
+
+@overload(call_at)
+def _call_at(address, *arguments):
+    return lambda address, *arguments: _jump(address, arguments)
+
+
+@intrinsic
+def _jump(_, address, arguments):
+    """The call itself: machine code of a callback takes its arguments by value."""
+
+    def generate(context, builder, signature, values):
+        types_ = [context.get_value_type(kind) for kind in arguments]
+        pointer_type = ir.FunctionType(ir.DoubleType(), types_).as_pointer()
+        items = [builder.extract_value(values[1], k) for k in range(len(types_))]
+        return builder.call(builder.inttoptr(values[0], pointer_type), items)
+
+    return types.float64(address, arguments), generate
 
 
 def digest(function: Callable) -> str:

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ancf_petsc.element.element import Element
-from ancf_petsc.kernel import motion, point_beam, point_solid, tet3413
+from ancf_petsc.kernel import point_beam, point_solid, tet3413
 from ancf_petsc.kernel.interface import Cells, Floats, Kernels
-from ancf_petsc.kernel.motion import MotionKernels
 from ancf_petsc.kernel.tables import make_tables, nodes_with_slopes
 from ancf_petsc.material.models import Law
 
@@ -19,13 +18,13 @@ from ancf_petsc.material.models import Law
 class KernelSet(NamedTuple):
     """cells(element, cells (e, a), reference (v, 3), **of make_tables): what kernels take of the cells.
 
-    motion: loops over whole steps of a motion, where there are such.
+    force_of_all(law, cells): address of the internal forces of all cells, for the loops of `kernel/motion`, where they are used.
     """
 
     name: str
     cells: Callable[..., tuple]
     kernels: Callable[[Law], Kernels]
-    motion: Callable[[Law], MotionKernels] | None = None
+    force_of_all: Callable[[Law, tuple], int] | None = None
 
 
 def _any_cells(element: Element, cells: NDArray[np.int32], reference: Floats, **more) -> Cells:
@@ -43,7 +42,7 @@ def _tetrahedra(
 
 SOLID = KernelSet("solid", _any_cells, point_solid.make_kernels)
 BEAM = KernelSet("beam", _any_cells, point_beam.make_kernels)
-FAST = {"3413": KernelSet("tet3413", _tetrahedra, tet3413.make_kernels, motion.make_motion_kernels)}
+FAST = {"3413": KernelSet("tet3413", _tetrahedra, tet3413.make_kernels, tet3413.force_of_all)}
 
 
 def kernel_set(element: Element) -> KernelSet:

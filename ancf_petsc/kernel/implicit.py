@@ -1,21 +1,18 @@
 """Steps of generalised alpha in one compiled loop, by Newton with a factor that is kept as long as it does its work.
 
-The loop returns to its caller where it wants a new factor, and goes on from there. Arrays as in `motion`, and
-    d (n, 3)              increment of positions of the step at work
-    still (n, 3)          overwritten
-    starts, factor        of the derivative of the balance by d over its 3 n components (`envelope`)
+The loop returns to its caller where it wants a new factor, and goes on from there. Arrays as in `motion`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 
 from ancf_petsc.algebra.envelope import solve_one
-from ancf_petsc.jit import composed, kernel
+from ancf_petsc.jit import kernel
+from ancf_petsc.kernel.motion import out_of_balance
+from ancf_petsc.material.tensor import inlined
 
 DONE, WANTS_FACTOR, FAILED = range(3)
 
@@ -59,7 +56,7 @@ class Progress(NamedTuple):
     waiting: bool
 
 
-@register_jitable
+@inlined
 def begin(scheme, v, a, d, still):
     """First guess of d, and what of M's factor does not depend on it."""
     h, am, af, beta, gamma, damping = scheme
@@ -71,7 +68,7 @@ def begin(scheme, v, a, d, still):
             still[i, c] = of_v * v[i, c] + of_a * a[i, c]
 
 
-@register_jitable
+@inlined
 def finish(scheme, x, v, a, d):
     """State at the end of the step."""
     h, _, _, beta, gamma, _ = scheme
@@ -83,7 +80,7 @@ def finish(scheme, x, v, a, d):
             x[i, c] += d[i, c]
 
 
-@register_jitable
+@inlined
 def add_to(x, factor, y):
     """x + factor y in x, fields (n, 3)."""
     for i in range(x.shape[0]):
@@ -91,7 +88,7 @@ def add_to(x, factor, y):
             x[i, c] += factor * y[i, c]
 
 
-@register_jitable
+@inlined
 def norm(x):
     """Of a field (n, 3)."""
     total = 0.0
@@ -101,73 +98,67 @@ def norm(x):
     return np.sqrt(total)
 
 
-def newton_of(unbalance: Callable) -> Callable:
-    """Newton's iterations of a step, to stand in the loop over steps."""
-
-    @composed
-    def evaluate(scheme, x, d, carried, still, system, share, values):
-        """The balance of the step in values (n, 3), 0 where driven, and its norm and that of the forces."""
-        h, am, af, beta, gamma, damping = scheme
-        inertia = am / (beta * h * h) + damping * af * gamma / (beta * h)
-        carried[:] = still
-        add_to(carried, inertia, d)
-        scale = np.sqrt(unbalance(x, d, af, carried, *system, values)) / af
-        for i in range(d.shape[0]):
-            for c in range(3):
-                values[i, c] = values[i, c] / af if share[i, c] != 0.0 else 0.0
-        return norm(values), scale
-
-    @composed
-    def newton(x, d, begun, waiting, scheme, test, fields, system, share, solver):
-        """Iterations on d until it balances or a factor is wanted. begun: iterations, last norm, whether aged.
-
-        Returns (status, iterations, last norm, whether aged).
-        """
-        iteration, before, aged = begun
-        carried, still, values = fields
-        floor = test.rounding * norm(x)
-        while True:
-            if not waiting:
-                residual, forces = evaluate(scheme, x, d, carried, still, system, share, values)
-                aged = aged or (iteration > 0 and residual > test.slow * before)
-                before = residual
-                if residual <= max(test.relative * forces, test.absolute, floor):
-                    return DONE, iteration, before, aged
-                if not np.isfinite(residual) or iteration == test.most:
-                    return FAILED, iteration, before, aged
-                if aged:
-                    return WANTS_FACTOR, iteration, before, aged
-            waiting = False
-            solve_one(*solver, values.reshape(-1))
-            add_to(d, -1.0, values)
-            iteration += 1
-
-    return newton
+@inlined
+def evaluate(x, d, rules, loads, system):
+    """The balance of the step in the buffer of values (n, 3), 0 where driven. Returns its norm and that of the forces."""
+    (h, am, af, beta, gamma, damping), _, _, (carried, still, values) = rules
+    share = system[2][3]
+    inertia = am / (beta * h * h) + damping * af * gamma / (beta * h)
+    carried[:] = still
+    add_to(carried, inertia, d)
+    scale = np.sqrt(out_of_balance((x, d, carried), af, loads, system, values)) / af
+    for i in range(d.shape[0]):
+        for c in range(3):
+            values[i, c] = values[i, c] / af if share[i, c] != 0.0 else 0.0
+    return norm(values), scale
 
 
-def alpha_kernel(unbalance: Callable) -> Callable:
-    """Steps of generalised alpha."""
-    newton = newton_of(unbalance)
+@inlined
+def newton(fields, begun, rules, loads, system):
+    """Iterations on d until it balances or a factor is wanted. fields: x, d. begun: iterations, last norm, aged, waiting.
 
-    @kernel
-    def march(x, v, a, d, progress, count, scheme, test, loads, body, graph, share, solver, buffers):
-        """Go on to `count` steps; x, v, a move on. Returns (status, Progress)."""
-        step, iteration, done, before, aged, waiting = progress
-        factors, patterns = loads
-        carried, still, force, values = buffers
-        while step < count:
-            system = (body, factors[step], patterns, graph, force)
-            if not waiting:
-                begin(scheme, v, a, d, still)
-                iteration, before = 0, np.inf
-            begun, fields = (iteration, before, aged), (carried, still, values)
-            status, iteration, before, aged = newton(
-                x, d, begun, waiting, scheme, test, fields, system, share, solver
-            )
-            if status != DONE:
-                return status, Progress(step, iteration, done, before, aged, status == WANTS_FACTOR)
-            finish(scheme, x, v, a, d)
-            step, done, waiting = step + 1, done + iteration, False
-        return DONE, Progress(step, 0, done, before, aged, False)
+    Returns (status, iterations, last norm, whether aged).
+    """
+    (x, d), (_, test, solver, (_, _, values)) = fields, rules
+    relative, absolute, rounding, slow, most = test
+    iteration, before, aged, waiting = begun
+    floor = rounding * norm(x)
+    while True:
+        if not waiting:
+            residual, forces = evaluate(x, d, rules, loads, system)
+            aged = aged or (iteration > 0 and residual > slow * before)
+            before = residual
+            if residual <= max(relative * forces, absolute, floor):
+                return DONE, iteration, before, aged
+            if not np.isfinite(residual) or iteration == most:
+                return FAILED, iteration, before, aged
+            if aged:
+                return WANTS_FACTOR, iteration, before, aged
+        waiting = False
+        solve_one(solver[0], solver[1], values.reshape(-1))
+        add_to(d, -1.0, values)
+        iteration += 1
 
-    return march
+
+@kernel
+def alpha_steps(state, progress, rules, loads, system):
+    """Go on to the step after the last of the loads' factors; x, v, a move on. Returns (status, Progress as a plain tuple).
+
+    state: x, v, a, d, the increment of positions of the step at work. rules: `Scheme`; `Test`; starts and factor of the derivative
+    of the balance by d over its 3 n components (`envelope`); buffers (3, n, 3), which are kept while the loop waits for a factor.
+    """
+    x, v, a, d = state
+    step, iteration, done, before, aged, waiting = progress
+    factors, patterns = loads
+    still = rules[3][1]
+    while step < factors.shape[0]:
+        if not waiting:
+            begin(rules[0], v, a, d, still)
+            iteration, before = 0, np.inf
+        begun = (iteration, before, aged, waiting)
+        status, iteration, before, aged = newton((x, d), begun, rules, (factors[step], patterns), system)
+        if status != DONE:
+            return status, (step, iteration, done, before, aged, status == WANTS_FACTOR)
+        finish(rules[0], x, v, a, d)
+        step, done, waiting = step + 1, done + iteration, False
+    return DONE, (step, 0, done, before, aged, False)

@@ -20,7 +20,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ancf_petsc.jit import composed, kernel
+from numba import typeof, types
+
+from ancf_petsc.jit import address_of, composed, kernel
 from ancf_petsc.kernel.interface import Kernel, Means, Span, Target
 from ancf_petsc.material.tensor import inlined
 
@@ -75,6 +77,18 @@ def compiled(gather: Gather, action: Action, named_cells: Callable) -> Kernel:
 
     of_plain_tuples.__name__ = action.point.__name__  # which names the machine code
     return _taking_named_tuples(kernel(of_plain_tuples))
+
+
+def force_of_all(gather: Gather, action: Action, named_cells: Callable, cells: tuple) -> int:
+    """Address of a loop over all cells, force_of_all(x, cells, parameters, out), for cells of these types; see `jit.call_at`."""
+    visit = loop(gather, action)
+
+    def force_of_all(x, cells, parameters, out):
+        named = named_cells(cells)
+        return visit((x,), named, parameters, Span(0, named.volumes.size), out)
+
+    vector, field = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C")
+    return address_of(force_of_all, types.float64(field, typeof(tuple(cells)), vector, field))
 
 
 def _taking_named_tuples(compiled_loop: Callable) -> Kernel:

@@ -1,50 +1,69 @@
-"""Motion of element 3413 in compiled loops: rates of change, whole steps of the central difference, and the
-balance of an implicit step; `adaptive` and `implicit` have the steps that are made of them.
+"""Motion in compiled loops: rates of change, whole steps of the central difference, and the balance of an implicit step;
+`adaptive` and `implicit` have the steps that are made of them.
 
 For a body of one material on one rank, whose driven degrees of freedom rest: what a step costs is then its
-arithmetic, not the interpreter's. With n nodal vectors:
-    x, v, a (n, 3)        positions, velocities, accelerations
-    factors (m, l)        of the loads at m times, patterns (l, n, 3) of the loads
-    starts (n+1,), factors (k, size), which (3,)  of the consistent mass (`envelope`): component c is solved
-                          for by factor which[c]; no factors with lumped mass
-    share (n, 3)          1 / mass of free components, 0 of driven ones: the inverse of a lumped mass
-    pointers, columns, values  the mass, one number for a pair of nodes
-    force (n, 3), work (3, n)  overwritten
+arithmetic, not the interpreter's. The loops know neither element nor law: they call the force by its address, and are compiled
+once for all laws. With n nodal vectors:
+    state                 x, v, a (n, 3), positions, velocities, accelerations; or y (2, n, 3), positions and velocities
+    loads                 factors (l,) of the loads, or (m, l) at m times; patterns (l, n, 3)
+    system                body, damping, mass, graph, buffers: the tuple that `System` describes
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 
 from ancf_petsc.algebra.envelope import solve_components
-from ancf_petsc.jit import composed, kernel
-from ancf_petsc.kernel.adaptive import leap_kernel
-from ancf_petsc.kernel.implicit import alpha_kernel
-from ancf_petsc.kernel.interface import Span
-from ancf_petsc.kernel.loop import loop
-from ancf_petsc.kernel.point_solid import force_action
-from ancf_petsc.kernel.tet3413 import GEOMETRY, SOLID, named_cells
-from ancf_petsc.material.models import Law
+from ancf_petsc.jit import call_at, kernel
+from ancf_petsc.material.tensor import inlined
 
 
-class MotionKernels(NamedTuple):
-    """The compiled loops of one law."""
+class System(NamedTuple):
+    """What a motion needs beside its state and loads. Compiled loops take a plain tuple, which is quicker to call with.
 
-    rates: Callable
-    march: Callable
-    unbalance: Callable
-    leap: Callable
-    alpha: Callable
+    body: address of the force of all cells (`loop.force_of_all`), cells, parameters of the law.
+    mass: starts (n+1,), factors (k, size), which (3,) of the consistent mass (`envelope`): component c is solved for by factor
+    which[c], no factors with lumped mass; share (n, 3): 1 / mass of free components, 0 of driven ones, inverse of a lumped mass.
+    graph: pointers, columns, values of the mass, one number for a pair of nodes.
+    buffers: force (n, 3) and work (3, n), overwritten.
+    """
+
+    body: tuple[int, tuple, Any]
+    damping: float
+    mass: tuple
+    graph: tuple
+    buffers: tuple
 
 
-@register_jitable
-def solve_mass(mass, force, work, a):
-    """Accelerations (n, 3) of forces (n, 3)."""
+@inlined
+def balance(x, factors, patterns, system):
+    """Loads less internal forces into the buffer of forces (n, 3), which is returned."""
+    body, _, _, _, buffers = system
+    address, cells, parameters = body
+    force = buffers[0]
+    force[:] = 0.0
+    call_at(address, x, cells, parameters, force)
+    for i in range(force.shape[0]):
+        for c in range(3):
+            force[i, c] = load(factors, patterns, i, c) - force[i, c]
+    return force
+
+
+@inlined
+def load(factors, patterns, i, c):
+    """Sum of all loads on one component."""
+    total = 0.0
+    for k in range(factors.size):
+        total += factors[k] * patterns[k, i, c]
+    return total
+
+
+@inlined
+def solve_mass(system, a):
+    """Accelerations (n, 3) of the forces in the buffer."""
+    _, _, mass, _, (force, work) = system
     starts, factors, which, share = mass
     if factors.shape[0]:
         solve_components(starts, factors, which, force, work, a)
@@ -54,16 +73,28 @@ def solve_mass(mass, force, work, a):
             a[i, c] = share[i, c] * force[i, c]
 
 
-@register_jitable
-def load(factors, patterns, i, c):
-    """Of all loads on a component."""
-    total = 0.0
-    for k in range(factors.size):
-        total += factors[k] * patterns[k, i, c]
-    return total
+@inlined
+def rates_at(y, loads, system, f):
+    """f = dy/dt of y = (x, v), both (2, n, 3): velocities and accelerations, 0 where driven."""
+    damping = system[1]
+    balance(y[0], loads[0], loads[1], system)
+    solve_mass(system, f[1])
+    for i in range(y.shape[1]):
+        for c in range(3):
+            f[0, i, c] = y[1, i, c]
+            f[1, i, c] -= damping * y[1, i, c]
 
 
-@register_jitable
+@kernel
+def rates(y, loads, system, f):
+    """`rates_at`, as a kernel."""
+    rates_at(y, loads, system, f)
+
+
+# --- the central difference
+
+
+@inlined
 def drift(x, v, a, h):
     """Velocities at the middle of a step, positions at its end."""
     for i in range(x.shape[0]):
@@ -72,7 +103,7 @@ def drift(x, v, a, h):
             x[i, c] += h * v[i, c]
 
 
-@register_jitable
+@inlined
 def kick(v, a, h, damping):
     """Velocities at the end of a step from undamped accelerations, which become the damped ones."""
     for i in range(v.shape[0]):
@@ -81,7 +112,7 @@ def kick(v, a, h, damping):
             a[i, c] -= damping * v[i, c]
 
 
-@register_jitable
+@inlined
 def power(factors, patterns, v):
     """Of the loads at velocities v."""
     total = 0.0
@@ -92,8 +123,8 @@ def power(factors, patterns, v):
     return total
 
 
-@register_jitable
-def carried_by(first, last, columns, values, v):
+@inlined
+def row_times(first, last, columns, values, v):
     """One row of M v: entries first to last."""
     x = y = z = 0.0
     for k in range(first, last):
@@ -104,100 +135,62 @@ def carried_by(first, last, columns, values, v):
     return x, y, z
 
 
-@register_jitable
-def kinetic_square(pointers, columns, values, v):
+@inlined
+def kinetic_square(graph, v):
     """v . M v."""
+    pointers, columns, values = graph
     total = 0.0
     for i in range(pointers.size - 1):
-        x, y, z = carried_by(pointers[i], pointers[i + 1], columns, values, v)
+        x, y, z = row_times(pointers[i], pointers[i + 1], columns, values, v)
         total += x * v[i, 0] + y * v[i, 1] + z * v[i, 2]
     return total
 
 
-@cache
-def make_motion_kernels(law: Law) -> MotionKernels:
-    """Compiled loops for one law."""
-    balance = balance_of(loop(GEOMETRY, force_action(law, SOLID)))
-    rates, unbalance = rates_of(balance), unbalance_of(balance)
-    return MotionKernels(
-        kernel(rates), march_kernel(balance), kernel(unbalance), leap_kernel(rates), alpha_kernel(unbalance)
-    )
+@kernel
+def march(state, h, loads, system):
+    """As many steps h as loads have rows of factors but one; x, v, a move on. Returns work of the loads and loss.
+
+    v at half a step: v + h/2 a; x + h v; then a at the end, where the damping is implicit.
+    """
+    x, v, a = state
+    factors, patterns = loads
+    _, damping, _, graph, _ = system
+    done = loss = 0.0
+    for step in range(factors.shape[0] - 1):
+        drift(x, v, a, h)
+        done += h * power((factors[step] + factors[step + 1]) / 2, patterns, v)
+        if damping != 0.0:
+            loss += h * damping * kinetic_square(graph, v)
+        balance(x, factors[step + 1], patterns, system)
+        solve_mass(system, a)
+        kick(v, a, h, damping)
+    return done, loss
 
 
-def balance_of(visit: Callable) -> Callable:
-    """The loop over forces, to stand in others."""
-
-    @composed
-    def balance(x, body, factors, patterns, force):
-        """force (n, 3): loads less internal forces."""
-        cells, parameters = named_cells(body[0]), body[1]
-        force[:] = 0.0
-        visit((x,), cells, parameters, Span(0, cells.volumes.size), force)
-        for i in range(force.shape[0]):
-            for c in range(3):
-                force[i, c] = load(factors, patterns, i, c) - force[i, c]
-
-    return balance
+# --- the balance of an implicit step
 
 
-def rates_of(balance: Callable) -> Callable:
-    """Rates of change, to stand in others."""
-
-    @composed
-    def rates(y, damping, body, factors, patterns, mass, force, work, f):
-        """f = dy/dt of y = (x, v), both (2, n, 3): velocities and accelerations, 0 where driven."""
-        balance(y[0], body, factors, patterns, force)
-        solve_mass(mass, force, work, f[1])
-        for i in range(y.shape[1]):
-            for c in range(3):
-                f[0, i, c] = y[1, i, c]
-                f[1, i, c] -= damping * y[1, i, c]
-
-    return rates
-
-
-def march_kernel(balance: Callable) -> Callable:
-    """Whole steps of the central difference."""
-
-    @kernel
-    def march(x, v, a, h, damping, body, factors, patterns, mass, graph, force, work):
-        """As many steps h as factors has rows but one; x, v, a move on. Returns work of the loads and loss.
-
-        v at half a step: v + h/2 a; x + h v; then a at the end, where the damping is implicit.
-        """
-        pointers, columns, values = graph
-        done = loss = 0.0
-        for step in range(factors.shape[0] - 1):
-            drift(x, v, a, h)
-            done += h * power((factors[step] + factors[step + 1]) / 2, patterns, v)
-            if damping != 0.0:
-                loss += h * damping * kinetic_square(pointers, columns, values, v)
-            balance(x, body, factors[step + 1], patterns, force)
-            solve_mass(mass, force, work, a)
-            kick(v, a, h, damping)
-        return done, loss
-
-    return march
+@inlined
+def out_of_balance(fields, part, loads, system, values):
+    """values (n, 3): M carried + Q(x + part d) - Q_e. fields: x, d, carried. Returns the sum of the squares of the three."""
+    x, d, carried = fields
+    pointers, columns, masses = system[3]
+    factors, patterns = loads
+    for i in range(x.shape[0]):
+        for c in range(3):
+            values[i, c] = x[i, c] + part * d[i, c]
+    force = balance(values, factors, patterns, system)
+    total = 0.0
+    for i in range(x.shape[0]):
+        inertia = row_times(pointers[i], pointers[i + 1], columns, masses, carried)
+        for c in range(3):
+            given = load(factors, patterns, i, c)
+            total += inertia[c] ** 2 + (given - force[i, c]) ** 2 + given**2
+            values[i, c] = inertia[c] - force[i, c]
+    return total
 
 
-def unbalance_of(balance: Callable) -> Callable:
-    """The balance of an implicit step, to stand in others."""
-
-    @composed
-    def unbalance(x, d, part, carried, body, factors, patterns, graph, force, values):
-        """values (n, 3): M carried + Q(x + part d) - Q_e. Returns the sum of the squares of the three."""
-        pointers, columns, masses = graph
-        for i in range(x.shape[0]):
-            for c in range(3):
-                values[i, c] = x[i, c] + part * d[i, c]
-        balance(values, body, factors, patterns, force)
-        total = 0.0
-        for i in range(x.shape[0]):
-            inertia = carried_by(pointers[i], pointers[i + 1], columns, masses, carried)
-            for c in range(3):
-                given = load(factors, patterns, i, c)
-                total += inertia[c] ** 2 + (given - force[i, c]) ** 2 + given**2
-                values[i, c] = inertia[c] - force[i, c]
-        return total
-
-    return unbalance
+@kernel
+def unbalance(fields, part, loads, system, values):
+    """`out_of_balance`, as a kernel."""
+    return out_of_balance(fields, part, loads, system, values)

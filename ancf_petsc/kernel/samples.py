@@ -16,11 +16,13 @@ from ancf_petsc.algebra import blocks, coarse
 from ancf_petsc.algebra.envelope import envelope, factorise, solve_fields
 from ancf_petsc.algebra.graph import block_starts, neighbours
 from ancf_petsc.element.element import Element
+from ancf_petsc.kernel import motion
+from ancf_petsc.kernel.adaptive import leap
 from ancf_petsc.kernel.choice import kernel_set
 from ancf_petsc.kernel.constant import add_mass, add_mass_blocks, mass_product
-from ancf_petsc.kernel.implicit import Progress, Scheme, Test
+from ancf_petsc.kernel.explicit import EXPLICIT
+from ancf_petsc.kernel.implicit import Scheme, Test, alpha_steps
 from ancf_petsc.kernel.interface import Means, Span, Target
-from ancf_petsc.kernel.motion import MotionKernels
 from ancf_petsc.kernel.tables import nodes_with_slopes
 from ancf_petsc.material.models import Law
 
@@ -71,8 +73,9 @@ def law_calls(element: Element, law: Law, *, mean: bool = False, moving: bool = 
     if mean and kernels.mean_force is not None and kernels.mean_tangent is not None:
         yield Call(kernels.mean_force, ((before, after), *rest, force))
         yield Call(kernels.mean_tangent, ((before, after), *rest, matrix))
-    if moving and chosen.motion is not None:
-        yield from _motion_calls(chosen.motion(law), (tuple(tables), p), before, graph)
+    if moving and chosen.force_of_all is not None:
+        body = (chosen.force_of_all(law, tables), tuple(tables), p)
+        yield from _motion_calls(body, before, graph)
 
 
 def common_calls(element: Element) -> Iterator[Call]:
@@ -131,9 +134,8 @@ def _block_calls(graph: tuple[NDArray, NDArray]) -> Iterator[Call]:
     yield Call(coarse.add_coarse_matrix, (half, (values, 0, none, columns), *rigid, np.zeros((6, 6))))
 
 
-def _motion_calls(
-    kernels: MotionKernels, body: tuple, x: NDArray, graph: tuple[NDArray, NDArray]
-) -> Iterator[Call]:
+def _motion_calls(body: tuple, x: NDArray, graph: tuple[NDArray, NDArray]) -> Iterator[Call]:
+    """body: as `motion.System` has it."""
     n = len(x)
     rows = np.repeat(np.arange(n), np.diff(graph[0]))
     values = np.where(graph[1] == rows, 1.0, 0.1)
@@ -142,34 +144,31 @@ def _motion_calls(
     yield Call(factorise, (starts, *graph, values, np.ones(n, bool), kept[0]))
     which, share = np.zeros(3, np.int64), np.ones((n, 3))
     yield Call(solve_fields, (starts, kept, which, deformed(np.zeros((n, 3)), 9), np.empty((3, n))))
-    mass, weighed = (starts, kept, which, share), (*graph, values)
-    force, work, rates = np.empty((n, 3)), np.empty((3, n)), np.empty((2, n, 3))
+    buffers = (np.empty((n, 3)), np.empty((3, n)))
+    system = tuple(motion.System(body, 0.3, (starts, kept, which, share), (*graph, values), buffers))
     factors, patterns = np.array([[1.0], [0.5]]), deformed(np.zeros((1, n, 3)), 10)
+    now = (factors[0], patterns)
     y = np.stack((x, deformed(np.zeros((n, 3)), 11)))
-    system = (0.3, body, factors[0], patterns, mass, force, work)
-    span, control = (0.0, 0.02, 1e-12), (0.01, 0.1, 1e-6, 1e-6, 1.1)
-    buffers = (np.zeros((7, 2, n, 3)), np.empty((2, n, 3)))
-    yield Call(kernels.leap, (y, span, 4, control, 0.3, weighed, system, *buffers))
-    yield from _implicit_calls(kernels, body, y, (factors, patterns), weighed)
-    moving = (y[0].copy(), y[1].copy(), np.zeros((n, 3)))
-    yield Call(kernels.march, (*moving, 0.01, 0.3, body, factors, patterns, mass, weighed, force, work))
-    balance = (body, factors[0], patterns, weighed, force, np.empty((n, 3)))
-    yield Call(kernels.unbalance, (y[0], y[1], 0.5, share, *balance))
+    course = ((0.0, 0.02, 1e-12, 4), (0.01, 0.1, 1e-6, 1e-6, 1.1))
+    yield Call(leap, (y, EXPLICIT["5dp"].as_arguments, course, now, system))
+    yield from _implicit_calls(y, (factors, patterns), system)
+    state = (y[0].copy(), y[1].copy(), np.zeros((n, 3)))
+    yield Call(motion.march, (state, 0.01, (factors, patterns), system))
+    values_of_balance = np.empty((n, 3))
     y.setflags(write=False)  # as PETSc lends its arrays
-    yield Call(kernels.rates, (y, *system, rates))
+    yield Call(motion.unbalance, ((y[0], y[1], share), 0.5, now, system, values_of_balance))
+    yield Call(motion.rates, (y, now, system, np.empty((2, n, 3))))
 
 
-def _implicit_calls(
-    kernels: MotionKernels, body: tuple, y: NDArray, loads: tuple, graph: tuple
-) -> Iterator[Call]:
+def _implicit_calls(y: NDArray, loads: tuple, system: tuple) -> Iterator[Call]:
     n = y.shape[1]
-    a, d, *buffers = np.zeros((6, n, 3))
+    a, d, *buffers = np.zeros((5, n, 3))
     scheme = Scheme(h=0.01, alpha_m=0.7, alpha_f=0.6, beta=0.3, gamma=0.6, damping=0.3)
     starts, factor = np.arange(3 * n + 1), np.full(3 * n, scheme.h * np.sqrt(scheme.beta / scheme.alpha_m))
     pointers = np.zeros(3 * n + 1, np.int32)  # PETSc's integers
     yield Call(envelope, (pointers, pointers))
     yield Call(factorise, (starts, pointers, pointers, factor, np.zeros(3 * n, bool), np.empty(3 * n)))
-    progress, test = Progress(0, 0, 0, np.inf, False, False), Test(1e-7, 0.0, 0.0, 0.5, 20)
-    state = (y[0].copy(), y[1].copy(), a, d)
-    rest = (body, graph, np.ones((n, 3)), (starts, factor), tuple(buffers))
-    yield Call(kernels.alpha, (*state, progress, 2, scheme, test, loads, *rest))
+    test = Test(1e-7, 0.0, 0.0, 0.5, 20)
+    rules = (tuple(scheme), tuple(test), (starts, factor), tuple(buffers))
+    state, progress = (y[0].copy(), y[1].copy(), a, d), (0, 0, 0, np.inf, False, False)
+    yield Call(alpha_steps, (state, progress, rules, loads, system))

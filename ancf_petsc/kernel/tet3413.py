@@ -15,9 +15,10 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from ancf_petsc.jit import composed, kernel
+from ancf_petsc.kernel import loop
 from ancf_petsc.kernel.interface import Floats, Kernels
 from ancf_petsc.kernel.loop import Action, Gather, named_target, nothing_to_close, sums_in_place
-from ancf_petsc.kernel.point_solid import Solid, solid_kernels
+from ancf_petsc.kernel.point_solid import Solid, force_action, solid_kernels
 from ancf_petsc.kernel.scatter import add_pair, add_whole
 from ancf_petsc.material.models import Law
 from ancf_petsc.material.tensor import (
@@ -271,6 +272,11 @@ SOLID = Solid(
 def make_kernels(law: Law) -> Kernels:
     """Kernels of element 3413 for one law."""
     return solid_kernels(law, SOLID)
+
+
+def force_of_all(law: Law, cells: tuple) -> int:
+    """Address of the internal forces of all cells, for compiled motions."""
+    return loop.force_of_all(GEOMETRY, force_action(law, SOLID), named_cells, cells)
 
 
 @kernel

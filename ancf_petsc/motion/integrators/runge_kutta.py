@@ -1,5 +1,5 @@
 """Explicit Runge-Kutta methods of PETSc: 5dp (Dormand and Prince 1980, the paper's ode45) and the classical
-one of order 4. Under loads that stay, steps of 5dp that adapt are made in one compiled loop where the body is simple
+one of order 4. Under loads that stay, steps of a pair that adapt are made in one compiled loop where the body is simple
 enough and no option speaks of TS; it is PETSc's pair with PETSc's control.
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 from petsc4py import PETSc
 
 from ancf_petsc.kernel.adaptive import NOT_FINITE, TOO_SHORT
+from ancf_petsc.kernel.explicit import EXPLICIT
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.fused import FusedMotion
 from ancf_petsc.motion.integrators.base import Settings, Step
@@ -31,7 +32,8 @@ class RungeKutta5dp(FirstOrder):
         with default_options({"ts_adapt_type": "basic" if self.adaptive else "none"}):
             self.ts.setFromOptions()
         self.begin(self.longest_stable)
-        free = self.adaptive and self.table == "5dp" and not begins_a_given_option("ts_")
+        pair = EXPLICIT[self.table].lower is not None
+        free = self.adaptive and pair and not begins_a_given_option("ts_")
         self._leaping = self.fused if free and self.fused is not None and self.fused.steady else None
 
     @property
@@ -45,9 +47,8 @@ class RungeKutta5dp(FirstOrder):
         tolerance, before = self.settings.tolerance, self.time
         position = tolerance * self.equations.assembly.model.size
         span = (self.time, goal, self.reach)
-        done = fused.leap(
-            self.y.array, span, (self._proposed, self._speed, position, tolerance, SPEED_CHANGE)
-        )
+        control = (self._proposed, self._speed, position, tolerance, SPEED_CHANGE)
+        done = fused.leap(self.y.array, EXPLICIT[self.table], span, control)
         if done.status == NOT_FINITE:
             raise self.failed(goal, "numbers are not finite any more")
         if done.status == TOO_SHORT:
