@@ -22,6 +22,7 @@ _HOMES = {
     "Case": "ancf_petsc.input.load",
     "load_case": "ancf_petsc.input.load",
     "case_from_dict": "ancf_petsc.input.load",
+    "case_of_run": "ancf_petsc.analysis.provenance",
     "Results": "ancf_petsc.results.reader",
     "open_results": "ancf_petsc.results.reader",
     "AncfError": "ancf_petsc.errors",

@@ -5,6 +5,11 @@ A message says what, where, what was expected and the cure, in one line.
 
 from __future__ import annotations
 
+import errno
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -78,7 +83,7 @@ class MotionStopped(AncfError):
 
 
 class EnvironmentProblem(AncfError):
-    """The machine lacks something: a package, a library, a launcher."""
+    """The machine lacks something: a package, a library, a launcher, space on the disk, the right to write."""
 
     exit_code = 4
 
@@ -94,3 +99,72 @@ def did_you_mean(word: str, known: list[str] | tuple[str, ...]) -> str:
     close = get_close_matches(word, known, n=1)
     listing = ", ".join(known) if known else "none"
     return f"did you mean {close[0]!r}? (there are: {listing})" if close else f"there are: {listing}"
+
+
+WHAT_HAPPENED = {
+    errno.ENOSPC: ("no space is left on the disk", "make room, or choose another folder by --out"),
+    errno.EDQUOT: ("the disk quota is used up", "make room, or choose another folder by --out"),
+    errno.EFBIG: ("the file would exceed the allowed size", "raise ulimit -f, or write fewer outputs"),
+    errno.EACCES: ("no permission to write", "restore the rights, or choose another folder by --out"),
+    errno.EPERM: ("no permission to write", "restore the rights, or choose another folder by --out"),
+    errno.EROFS: ("the file system is read-only", "choose another folder by --out"),
+    errno.ENOENT: ("it has vanished", "do not remove or rename a folder while a run writes into it"),
+    errno.ENOTDIR: ("its folder has vanished", "do not remove or rename a folder while a run writes into it"),
+    errno.ESTALE: ("it was replaced or removed", "let one run alone write into a folder"),
+    errno.EISDIR: ("a folder has its name", "remove that, or choose another folder by --out"),
+    errno.EAGAIN: ("another program has it open and locked", "close it there (HDFView, h5py, ...)"),
+    errno.EIO: ("the device reports an error", "look at the disk or the network"),
+    errno.EMFILE: ("too many files are open", "raise ulimit -n"),
+}
+
+
+def cannot_write(error: Exception, path: str | Path) -> EnvironmentProblem:
+    """What an OSError, or one of HDF5's, means for the file or folder that was written: one line."""
+    number = error_number(error)
+    what, cure = WHAT_HAPPENED.get(number, ("", ""))
+    path = Path(path)
+    if number == errno.ENOENT and not path.parent.is_dir():
+        what = f"the folder {path.parent} has vanished"
+    if number == errno.ENOSPC and (free := _free_bytes(path)) is not None:
+        what = f"{what} ({free / 1e6:.3g} MB free)"
+    what = what or " ".join(str(error).split()) or type(error).__name__
+    return EnvironmentProblem(f"{path}: cannot be written: {what}" + (f"; {cure}" if cure else ""))
+
+
+CHOICE_OF_PATH = (
+    errno.EACCES, errno.EEXIST, errno.EINVAL, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT,
+    errno.ENOTDIR, errno.EPERM, errno.EROFS,
+)  # fmt: skip
+
+
+@contextmanager
+def writing(path: str | Path, key: str = "") -> Iterator[None]:
+    """Around what writes `path`: what the system refuses is an EnvironmentProblem.
+
+    key: of the path where the user has just chosen it; a place that cannot be written to is then a CaseError.
+    """
+    try:
+        yield
+    except OSError as error:
+        if key and error.errno in CHOICE_OF_PATH:
+            place = error.filename or path
+            what = f"cannot be written: {error.strerror or error}"
+            raise CaseError(what, file=place, key=key, cure="choose another place") from error
+        raise cannot_write(error, path) from error
+
+
+def error_number(error: Exception) -> int:
+    """The operating system's number of an error; HDF5 has it in its text only. 0 where there is none."""
+    if isinstance(error, OSError) and error.errno:
+        return error.errno
+    found = re.search(r"errno = (\d+)", str(error))
+    return int(found[1]) if found else 0
+
+
+def _free_bytes(path: Path) -> int | None:
+    """What an ordinary user may still write beside a file."""
+    try:
+        disk = os.statvfs(path.parent)
+    except (OSError, AttributeError):
+        return None
+    return disk.f_bavail * disk.f_frsize

@@ -1,7 +1,8 @@
 """The log: lines on the terminal and in log.txt, written by the root rank only, and a progress bar.
 
 Library modules take `logging.getLogger("ancf")` and say what happens; the command line calls `configure`.
-Lines of the logger "ancf.step", one a step, give way to the bar where there is one; the file has them all.
+Lines of the logger "ancf.step", one a step, give way to the bar where there is one; the file has them all. Those of
+"ancf.record", what a run says of itself, are for the file. The terminal shows both with the details (`--verbose`).
 """
 
 from __future__ import annotations
@@ -14,8 +15,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Protocol, TextIO
 
+from ancf_petsc.errors import cannot_write
+
 LOGGER = logging.getLogger("ancf")
 STEPS = "ancf.step"
+RECORD = "ancf.record"
 
 
 class _Lines(logging.Formatter):
@@ -39,7 +43,9 @@ class _Terminal(logging.StreamHandler):
         return sys.stdout
 
     def filter(self, record: logging.LogRecord) -> Any:
-        return super().filter(record) and not (self.bar and record.name.startswith(STEPS))
+        hidden = (STEPS, RECORD) if self.bar else RECORD
+        terse = self.level > logging.DEBUG
+        return super().filter(record) and not (terse and record.name.startswith(hidden))
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802
         """Whoever read the lines has gone (`| head`): the computation goes on without them."""
@@ -47,6 +53,25 @@ class _Terminal(logging.StreamHandler):
             silence_output()
         else:
             super().handleError(record)
+
+
+class _File(logging.FileHandler):
+    """log.txt. A line that finds no space is lost, and said once: the outputs decide whether the run can go on."""
+
+    said = False
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802
+        error = sys.exc_info()[1]
+        if not isinstance(error, OSError):
+            super().handleError(record)
+        elif not self.said:
+            self.said = True
+            LOGGER.warning("%s", cannot_write(error, self.baseFilename))
+
+    def close(self) -> None:
+        """Closing writes what is left: without space that is lost too."""
+        with suppress(OSError):
+            super().close()
 
 
 class _Pending(logging.Handler):
@@ -107,7 +132,7 @@ def attach_file(path: str | Path) -> None:
     waiting = [handler for handler in LOGGER.handlers if isinstance(handler, _Pending)]
     if not waiting:
         return
-    file = logging.FileHandler(path, mode="w", encoding="utf-8")
+    file = _File(path, mode="w", encoding="utf-8")
     file.setFormatter(_Lines())
     for pending in waiting:
         LOGGER.removeHandler(pending)

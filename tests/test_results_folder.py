@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import json
 import os
+import signal
+import socket
+import subprocess
+import sys
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from ancf_petsc.errors import CaseError
-from ancf_petsc.results.folder import RUN_FILES, check_folder, claim_folder, run_title, write_summary
+from ancf_petsc.results.folder import RUN_FILES, check_folder, claim_folder, run_in, write_summary
+from ancf_petsc.results.mark import MARK, SPARE_BYTES, read_mark
 from ancf_petsc.results.store import ResultStore
 
 SUMMARY = {
@@ -79,21 +87,102 @@ def test_a_run_gives_way_to_one_of_the_same_title_only(tmp_path):
     assert "found \"a run of 'Block'\", expected an empty folder, or a run of 'Pendulum'" in message
 
 
-def test_the_summary_tells_the_title_where_the_results_are_broken(tmp_path):
+def test_a_run_gives_way_to_one_of_the_same_hash_only(tmp_path):
+    """Also one that was cut short and has no summary: the results have the hash of case and mesh."""
+    ResultStore(tmp_path, MPI.COMM_SELF, "Block", "SI", facts={"hash": "abc"})
+    check_folder(tmp_path, "Block", "abc")
+    check_folder(tmp_path, "Renamed in the case", "abc")
+    for other in ("abd", ""):
+        with pytest.raises(CaseError, match="with other values or another mesh.*--out DIR.*--force"):
+            check_folder(tmp_path, "Block", other)
+        check_folder(tmp_path, "Block", other, force=True)
+        with pytest.raises(CaseError, match="with other values"):
+            claim_folder(tmp_path, "Block", other)  # what ended there since the check
+    assert read_mark(tmp_path) is None
+
+
+def test_a_run_that_recorded_no_case_needs_force(tmp_path):
     write_summary(tmp_path, **SUMMARY)
+    with pytest.raises(CaseError, match="did not record its case"):
+        check_folder(tmp_path, "Block", "abc")
+
+
+def test_the_summary_says_what_the_run_was_where_the_results_are_broken(tmp_path):
+    write_summary(tmp_path, **SUMMARY, hash="abc")
     (tmp_path / "results.h5").write_bytes(b"cut short")
-    assert run_title(tmp_path) == "Block"
+    assert run_in(tmp_path) == ("Block", "abc")
     (tmp_path / "summary.json").write_text("{")
-    assert run_title(tmp_path) is None
+    assert run_in(tmp_path) is None
+    (tmp_path / MARK).write_text('{"title": "Block", "hash": "abc"}')  # killed before its first output
+    assert run_in(tmp_path) == ("Block", "abc")
 
 
 def test_a_new_run_takes_away_the_files_of_the_earlier_one_only(tmp_path):
     for name in (*RUN_FILES, "notes.txt", "case.toml", "force_stroke.png"):
         (tmp_path / name).write_text("old")
-    claim_folder(tmp_path)
+    claim_folder(tmp_path, force=True).release()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["case.toml", "force_stroke.png", "notes.txt"]
-    claim_folder(tmp_path / "new" / "folder")
-    assert (tmp_path / "new" / "folder").is_dir()
+    mark = claim_folder(tmp_path / "new" / "folder", "Block", "abc")
+    assert read_mark(tmp_path / "new" / "folder")["hash"] == "abc"
+    mark.release()
+    assert list((tmp_path / "new" / "folder").iterdir()) == []
+
+
+def test_a_live_run_keeps_others_out_of_its_folder(tmp_path):
+    """Before a run begins and when it takes the folder; force changes nothing. Afterwards it is free again."""
+    mark = claim_folder(tmp_path, "Block", "abc")
+    for attempt in (check_folder, claim_folder):
+        for force in (False, True):
+            with pytest.raises(CaseError, match=rf"another run is writing.*process {os.getpid()} on"):
+                attempt(tmp_path, "Block", "abc", force=force)
+    mark.release()
+    claim_folder(tmp_path, "Block", "abc").release()
+
+
+def test_the_mark_of_a_killed_run_does_not_stop_the_next(tmp_path):
+    """The system drops the lock with the process; the mark that stays says what the run was."""
+    code = "import sys, os, signal; from ancf_petsc.results.folder import claim_folder\n"
+    code += "claim_folder(sys.argv[1], 'Block', 'abc'); os.kill(os.getpid(), signal.SIGKILL)"
+    done = subprocess.run([sys.executable, "-c", code, tmp_path], timeout=60)
+    assert done.returncode == -signal.SIGKILL
+    assert read_mark(tmp_path)["hash"] == "abc"
+    check_folder(tmp_path, "Block", "abc")
+    claim_folder(tmp_path, "Block", "abc").release()
+    assert not (tmp_path / MARK).exists()
+
+
+@pytest.mark.parametrize(
+    ("mark", "alive", "forced"),
+    [
+        ({"host": socket.gethostname(), "pid": os.getpid()}, True, True),
+        ({"host": socket.gethostname(), "pid": os.getpid(), "start": "another process had the number"}, False, False),
+        ({"host": socket.gethostname(), "pid": 2**22 + 1}, False, False),
+        ({"host": "another", "pid": 1}, True, False),
+        ({}, False, False),
+    ],
+)  # fmt: skip
+def test_without_locks_host_and_process_decide(mark, alive, forced, tmp_path, monkeypatch):
+    """A file system without locks, as some over the network are: only force passes the mark of another host."""
+
+    def no_locks(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", no_locks)
+    (tmp_path / MARK).write_text(json.dumps({**mark, "title": "Block", "hash": "abc"}))
+    for force, refuses in ((False, alive), (True, forced)):
+        with pytest.raises(CaseError, match="another run") if refuses else nullcontext():
+            check_folder(tmp_path, "Block", "abc", force=force)
+    if not alive:
+        claim_folder(tmp_path, "Block", "abc").release()
+
+
+def test_the_mark_keeps_space_for_the_summary(tmp_path):
+    mark = claim_folder(tmp_path, "Block", "abc")
+    before = (tmp_path / MARK).stat().st_size
+    mark.make_room()
+    assert before - (tmp_path / MARK).stat().st_size == SPARE_BYTES
+    assert read_mark(tmp_path)["title"] == "Block"
+    mark.release()
 
 
 def test_the_summary_is_json_that_any_reader_takes(tmp_path):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import h5py
 import meshio
@@ -90,3 +92,17 @@ def test_energy_balances_the_work_of_the_top(folder):
     """The work follows a cubic through the reactions of these four wide steps: 3e-4 here, 1e-6 with 25."""
     curve = open_results(folder).curve
     assert curve["external_work"][-1] == pytest.approx(curve["strain_energy"][-1], rel=1e-3)
+
+
+def test_results_say_what_was_computed(folder):
+    """On any number of ranks: the attributes are those of the summary, and the mesh's digest its file's."""
+    summary, facts = json.loads((folder / "summary.json").read_text()), open_results(folder).facts
+    mesh = Path(summary["mesh"]["file"])
+    assert facts["mesh_sha256"] == summary["mesh"]["sha256"] == hashlib.sha256(mesh.read_bytes()).hexdigest()
+    for name in ("hash", "date", "host", "command"):
+        assert facts[name] == summary[name]
+    assert facts["case"] == summary["case"]["text"]
+    assert facts["ranks"] == str(summary["ranks"])
+    assert "steps = 4" in facts["case"]
+    assert facts["hash"] in (folder / "log.txt").read_text()
+    assert not (folder / "running.json").exists()

@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from petsc4py import PETSc
 
-from ancf_petsc.analysis.build import build_from
+from ancf_petsc.analysis.build import Built, build_from
 from ancf_petsc.analysis.damping import RIGID, static_answer
 from ancf_petsc.analysis.host.versions import program_version
 from ancf_petsc.analysis.output_points import OutputPoints
-from ancf_petsc.errors import CaseError
+from ancf_petsc.analysis.provenance import provenance_of
+from ancf_petsc.errors import CaseError, writing
 from ancf_petsc.input.load import Case
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.mass import Mass
@@ -24,7 +26,7 @@ from ancf_petsc.results.store import ResultStore
 from ancf_petsc.results.tables import CsvTable
 from ancf_petsc.solve.events import place_of
 from ancf_petsc.solve.modes import Modes, modes_at
-from ancf_petsc.solve.petsc import petsc_options, refuse_unused
+from ancf_petsc.solve.petsc import petsc_options
 
 LARGEST_SHOWN = 0.1  # of the size of the body: the largest displacement of a shape
 COLUMNS = ("mode", "frequency", "period", "omega", "critical_damping", "growth_rate")
@@ -41,23 +43,45 @@ def find_modes(
     """
     title = f"{case.spec.title}: modes"
     _need_density(case)
-    on_root(comm, lambda: check_folder(folder, title, force=force))
-    with petsc_options(case.spec.petsc):
-        built = build_from(case, on_root(comm, lambda: make_plan(case)), comm)
+    with petsc_options(case.spec.petsc) as given:
+        plan = on_root(comm, lambda: make_plan(case))
+        about = on_root(comm, lambda: provenance_of(case, comm.size))
+        ours = (title, f"{about.identity.hash} modes {count} {loaded}" if about else "")
+        on_root(comm, lambda: check_folder(folder, *ours, force=force))
+        built = build_from(case, plan, comm)
         assembly = Assembly(built.model)
         lumped = case.spec.dynamics is not None and case.spec.dynamics.mass == "lumped"
         mass = Mass(assembly, lumped=lumped)
         x = static_answer(case, assembly) if loaded else assembly.reference_vector()
         modes = modes_at(assembly, mass, x, count)
-        refuse_unused(case.spec.petsc)
-    on_root(comm, lambda: claim_folder(folder))
+        given.refuse_unused(comm)
+    mark = on_root(comm, lambda: claim_folder(folder, *ours, force=force))
+    try:
+        facts = {**about.attributes(), "hash": ours[1], "contents": "modes"} if about else None
+        return _write(case, folder, title, facts, assembly, built, modes, x)
+    finally:
+        if mark is not None:
+            mark.release()
+
+
+def _write(
+    case: Case,
+    folder: Path,
+    title: str,
+    facts: dict[str, str] | None,
+    assembly: Assembly,
+    built: Built,
+    modes: Modes,
+    x: PETSc.Vec,
+) -> NDArray[np.float64]:
+    """The table and the shapes about the state x; the rows. Collective."""
+    comm = assembly.comm
     rows = _rows(modes)
     _warn_of_unstable(assembly, modes, rows[:, 5])
-    if comm.rank == 0:
-        with CsvTable(folder / "modes.csv", COLUMNS) as table:
-            for row in rows:
-                table.append(row)
-    store = ResultStore(folder, comm, title, case.spec.units, note=case.spec.note, version=program_version())
+    on_root(comm, lambda: _write_table(folder / "modes.csv", rows))
+    store = ResultStore(
+        folder, comm, title, case.spec.units, note=case.spec.note, version=program_version(), facts=facts
+    )
     order = built.order
     store.write_mesh(
         order.points, order.kind, order.cells, order.node_numbers, order.cell_numbers, order.groups
@@ -68,8 +92,15 @@ def find_modes(
         largest = comm.allreduce(float(np.abs(shape[built.model.own_positions]).max(initial=0.0)), MPI.MAX)
         shown = before + LARGEST_SHOWN * built.model.size / largest * shape
         fields = {"displacement": points(shown)}
-        store.write_step(row[0], fields, {}, {"frequency": row[1]})
+        store.write_step(row[0], fields, {}, {"frequency": row[1], "growth_rate": row[5]})
+    store.close()
     return rows
+
+
+def _write_table(path: Path, rows: NDArray[np.float64]) -> None:
+    with writing(path), CsvTable(path, COLUMNS) as table:
+        for row in rows:
+            table.append(row)
 
 
 def _rows(modes: Modes) -> NDArray[np.float64]:

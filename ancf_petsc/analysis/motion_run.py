@@ -75,6 +75,10 @@ class MotionRun:
         ):
             self.totals[name] += count
             self._since[name] += count
+        log.debug(
+            "    t %.9g: steps %d, newton %d, linear %d, rejected %d",
+            step.time, step.count, step.newton, step.linear, step.rejected,
+        )  # fmt: skip
         if step.time in self.path.corners:
             self._kinetic = self._kinetic_energy()
         self._add_work(step)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -13,10 +14,11 @@ from petsc4py import PETSc
 from ancf_petsc.analysis.build import Built
 from ancf_petsc.analysis.output_points import OutputPoints
 from ancf_petsc.axes import AXES
+from ancf_petsc.errors import writing
 from ancf_petsc.input.schema import CaseSpec
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.measures import mean_position, mean_stress, reaction, von_mises
-from ancf_petsc.parallel.exchange import ToSlabs, combined
+from ancf_petsc.parallel.exchange import ToSlabs, combined, on_root
 from ancf_petsc.plan.curve import STROKE
 from ancf_petsc.plan.probes import name_of
 from ancf_petsc.results.store import ResultStore
@@ -29,7 +31,16 @@ COUNTS = ("newton_iterations", "linear_iterations", "steps")
 class Record:
     """Writes outputs into a folder. Every method is collective."""
 
-    def __init__(self, folder: Path, spec: CaseSpec, built: Built, assembly: Assembly, version: str) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        spec: CaseSpec,
+        built: Built,
+        assembly: Assembly,
+        version: str,
+        facts: Mapping[str, str] | None = None,
+    ) -> None:
+        """facts: attributes of results.h5, on the root rank."""
         self.folder = folder
         self.spec = spec
         self.built = built
@@ -41,15 +52,18 @@ class Record:
         self._points = OutputPoints(assembly, order)
         own = np.flatnonzero(numbering.own_cells)
         self._cells = ToSlabs(self.comm, numbering.file_cells[own], order.total_cells, of=own)
-        self._store = ResultStore(folder, self.comm, spec.title, spec.units, note=spec.note, version=version)
+        self._store = ResultStore(
+            folder, self.comm, spec.title, spec.units, note=spec.note, version=version, facts=facts
+        )
         self._store.write_mesh(
             order.points, order.kind, order.cells, order.node_numbers, order.cell_numbers, order.groups
         )
 
     def close(self) -> None:
-        """Close the tables."""
+        """Close the files."""
         for table in self._tables.values():
             table.close()
+        self._store.close()
 
     def write(
         self,
@@ -69,9 +83,9 @@ class Record:
         row |= {name: value for name, value in more.items() if name not in row} | self._reactions(
             out_of_balance
         )
-        self._append("curve.csv", row)
+        rows = {"curve.csv": row}
         if self.spec.probe:
-            self._append("probes.csv", {**time, **self._probes(x)})
+            rows["probes.csv"] = {**time, **self._probes(x)}
         positions, model = x.array_r.reshape(-1, 3), self.assembly.model
         nodes = {"displacement": positions - model.reference[: model.owned], **(node_fields or {})}
         points = {name: self._points(rows) for name, rows in nodes.items()}
@@ -80,6 +94,8 @@ class Record:
         cells = {"det_F": det, "von_mises": von_mises(cauchy), "cauchy": cauchy, "green_lagrange": strain}
         del strain, cauchy
         (now,) = time.values()
+        self._store.prepare_step(_widths(points), _widths(cells))
+        on_root(self.comm, lambda: self._append(rows))
         self._store.write_step(now, points, self._cell_fields(cells))
         self.row = row
         return row
@@ -132,9 +148,16 @@ class Record:
             columns |= {f"{probe.name}.u{axis}": displacement[i] for i, axis in enumerate(AXES)}
         return columns
 
-    def _append(self, file: str, row: Mapping[str, float]) -> None:
-        if self.comm.rank:
-            return
-        if file not in self._tables:
-            self._tables[file] = CsvTable(self.folder / file, list(row))
-        self._tables[file].append(row)
+    def _append(self, rows: Mapping[str, Mapping[str, float]]) -> None:
+        """Add a row to each table. On the root rank."""
+        for file, row in rows.items():
+            path = self.folder / file
+            with writing(path):
+                if file not in self._tables:
+                    self._tables[file] = CsvTable(path, list(row))
+                self._tables[file].append(row)
+
+
+def _widths(fields: Mapping[str, NDArray]) -> dict[str, int]:
+    """Numbers a row of each field."""
+    return {name: math.prod(rows.shape[1:]) for name, rows in fields.items()}

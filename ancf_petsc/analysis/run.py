@@ -3,29 +3,32 @@
 from __future__ import annotations
 
 import logging
-import resource
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
 from ancf_petsc.analysis.build import Built, build_from
+from ancf_petsc.analysis.ending import Ending
 from ancf_petsc.analysis.host.clock import Clock
 from ancf_petsc.analysis.host.signals import StopRequest
-from ancf_petsc.analysis.host.versions import program_version, versions
+from ancf_petsc.analysis.host.versions import program_version
+from ancf_petsc.analysis.provenance import provenance_of
 from ancf_petsc.analysis.record import Record
 from ancf_petsc.analysis.statics import StaticAnalysis
 from ancf_petsc.element.catalog import element
-from ancf_petsc.errors import Interrupted
+from ancf_petsc.errors import AncfError
 from ancf_petsc.input.load import Case
 from ancf_petsc.kernel.warmup import compile_kernels, is_compiled
 from ancf_petsc.log import log_file
 from ancf_petsc.material import law_named
-from ancf_petsc.parallel.exchange import agree, on_root
+from ancf_petsc.parallel.exchange import on_root
 from ancf_petsc.plan.plan import Plan, make_plan
-from ancf_petsc.results.folder import check_folder, claim_folder, write_summary
-from ancf_petsc.solve.petsc import petsc_options, refuse_unused, refuse_wrong_values
+from ancf_petsc.results.folder import check_folder, claim_folder
+from ancf_petsc.solve.petsc import petsc_options, refuse_wrong_values
 
 if TYPE_CHECKING:
     from ancf_petsc.analysis.motion import MotionAnalysis
@@ -44,16 +47,18 @@ def run_case(
 ) -> Path:
     """Solve a case and leave its results in a folder, which is returned. Collective.
 
-    folder: default results/NAME. force: overwrite a folder that holds something else. imports: seconds
-    spent before. watch: told the part of the path done, 0 to 1. Raises CaseError, NoEquilibrium,
-    MotionStopped, Interrupted; what was computed before is saved.
+    folder: default results/NAME. force: overwrite a folder that holds something else, such as a run of another
+    case. imports: seconds spent before. watch: gets the part of the path done, 0 to 1. Raises CaseError,
+    NoEquilibrium, MotionStopped, EnvironmentProblem, Interrupted; what was computed before is saved.
     """
     folder = Path(folder) if folder else Path("results") / case.name
     clock = Clock(imports)
-    on_root(comm, lambda: check_folder(folder, case.spec.title, force=force))
-    with petsc_options(case.spec.petsc):
+    with petsc_options(case.spec.petsc) as given:
         with clock.part("read"):
             plan = on_root(comm, lambda: _read(case))
+            about = on_root(comm, lambda: provenance_of(case, comm.size))
+        ours = (case.spec.title, about.identity.hash if about else "")
+        on_root(comm, lambda: check_folder(folder, *ours, force=force))
         with clock.part("setup"), refuse_wrong_values(case.spec.petsc):
             _compile(case, comm)
             built = build_from(case, plan, comm)
@@ -63,10 +68,14 @@ def run_case(
             if case.spec.petsc:
                 with clock.part("setup"), refuse_wrong_values(case.spec.petsc):
                     solver.prepare()
-                    agree(comm, lambda: refuse_unused(case.spec.petsc))
-            on_root(comm, lambda: claim_folder(folder))
-            with log_file(folder / "log.txt", comm.rank):
-                _solve(case, built, solver, folder, clock, watch)
+                    given.refuse_unknown(comm)
+            with ExitStack() as stack:
+                mark = on_root(comm, lambda: claim_folder(folder, *ours, force=force))
+                if mark is not None:
+                    stack.callback(mark.release)
+                on_root(comm, lambda: stack.enter_context(log_file(folder / "log.txt", comm.rank)))
+                _solve(case, built, solver, Ending(folder, clock, about, mark), watch)
+            given.refuse_unused(comm)
         finally:
             solver.destroy()
     return folder
@@ -104,28 +113,42 @@ def _solve(
     case: Case,
     built: Built,
     solver: StaticAnalysis | MotionAnalysis,
-    folder: Path,
-    clock: Clock,
+    ending: Ending,
     watch: Callable[[float], None],
 ) -> None:
     """Follow the path or the motion; whatever happens, the summary says how it ended."""
-    comm = solver.assembly.comm
+    comm, clock = solver.assembly.comm, ending.clock
+    if ending.about is not None:
+        ending.about.write_log()
     log.info("%s; solver: %s", describe(case, built), solver.describe())
+    log_shares(built)
     with clock.part("output"):
-        record = Record(folder, case.spec, built, solver.assembly, program_version())
+        attributes = ending.about.attributes() if ending.about else None
+        record = Record(ending.folder, case.spec, built, solver.assembly, program_version(), attributes)
     stop = StopRequest(comm)
     run = solver.begin(record, clock, watch, stop.asked)
-    status = "stopped"
+    failure: AncfError | None = None
     try:
         with stop.watched(), clock.part("solve"):
             run.go()
-        status = "done"
-    except Interrupted:
-        status = "interrupted"
+    except (
+        AncfError
+    ) as error:  # of all ranks; any other error is of this one alone, and summing up would wait
+        failure = error
         raise
     finally:
         record.close()
-        _summarise(case, built, folder, status, clock, run.totals, record.row, solver.facts(), comm)
+        if failure is not None or sys.exc_info()[0] is None or comm.size == 1:
+            ending.write(case, built, run.totals, record.row, solver.facts(), failure)
+
+
+def log_shares(built: Built) -> None:
+    """A line of details: nodal vectors and elements of each rank. Collective."""
+    numbering = built.model.numbering
+    shares = built.model.comm.gather((built.model.owned, int(numbering.own_cells.sum())))
+    if shares and len(shares) > 1:
+        words = ", ".join(f"{vectors} and {cells}" for vectors, cells in shares)
+        log.debug("nodal vectors and elements of each rank: %s", words)
 
 
 def describe(case: Case, built: Built) -> str:
@@ -136,36 +159,3 @@ def describe(case: Case, built: Built) -> str:
         f"{case.spec.title}: {built.order.total_nodes} nodes, {built.order.total_cells} elements "
         f"{case.spec.mesh.element}, {laws}, {ranks} rank{'s' * (ranks > 1)}"
     )
-
-
-def _summarise(
-    case: Case,
-    built: Built,
-    folder: Path,
-    status: str,
-    clock: Clock,
-    totals: Mapping[str, int],
-    final: Mapping[str, float],
-    facts: Mapping[str, Any],
-    comm: MPI.Comm,
-) -> None:
-    memory = comm.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
-    dof = built.model.dof
-    if comm.rank == 0:
-        write_summary(
-            folder,
-            title=case.spec.title,
-            status=status,
-            seconds=clock.report(),
-            memory_peak_bytes=memory,
-            nodes=built.order.total_nodes,
-            elements=built.order.total_cells,
-            dof=dof,
-            ranks=comm.size,
-            iterations={"newton": totals["newton_iterations"], "linear": totals["linear_iterations"]},
-            final=dict(final),
-            versions=versions(),
-            note=case.spec.note,
-            steps=totals["steps"],
-            **facts,
-        )

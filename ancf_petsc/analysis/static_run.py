@@ -174,3 +174,5 @@ class StaticRun:
             self.record.row["min_det_F"] if step.s == self._written else self.assembly.smallest_det(x),
             step.size,
         )
+        residuals = " ".join(f"{value:.2e}" for value in step.residuals)
+        log.debug("    out of balance, of the largest force, after each iteration: %s", residuals)

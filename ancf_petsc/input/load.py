@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
@@ -63,13 +64,35 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), petsc_options: Se
     """
     file = _case_file(Path(path))
     data = toml.read(file)
+    _change(data, overrides, petsc_options)
+    name = file.resolve().parent.name if file.name == CASE_FILE else file.stem
+    return _checked(data, file, file.resolve().parent, name, _with_changes(file, overrides))
+
+
+def case_from_text(
+    text: str,
+    source: Path,
+    folder: Path,
+    name: str,
+    overrides: Sequence[str] = (),
+    petsc_options: Sequence[str] = (),
+) -> Case:
+    """A case from TOML text that `source`, named in messages, holds; file names refer to `folder`. Raises CaseError."""
+    data = toml.parse(text, source)
+    _change(data, overrides, petsc_options)
+    return _checked(data, source, folder, name, _with_changes(source, overrides))
+
+
+def _change(data: dict[str, Any], overrides: Sequence[str], petsc_options: Sequence[str]) -> None:
     apply_settings(data, overrides)
     if petsc_options:
         for name, value in petsc_table(petsc_options).items():
             set_value(data, ("petsc", name), value)
-    name = file.resolve().parent.name if file.name == CASE_FILE else file.stem
-    told = f"{file} with --set {' '.join(overrides)}" if overrides else file
-    return _checked(data, file, file.resolve().parent, name, told)
+
+
+def _with_changes(file: Path, overrides: Sequence[str]) -> str | Path:
+    """The source of a case, for messages."""
+    return f"{file} with --set {shlex.join(overrides)}" if overrides else file
 
 
 def case_from_dict(data: Mapping[str, Any], folder: str | Path, name: str = "case") -> Case:
@@ -80,6 +103,7 @@ def case_from_dict(data: Mapping[str, Any], folder: str | Path, name: str = "cas
 def _checked(
     data: dict[str, Any], file: Path | None, folder: Path, name: str, told: str | Path | None = None
 ) -> Case:
+    _refuse_nul(data, told or file or name)
     source = _tuples(data)
     frozen = dict(source)
     if isinstance(source.get("material"), dict):
@@ -101,14 +125,31 @@ def _tuples(value: Any) -> Any:
     return tuple(map(_tuples, value)) if isinstance(value, list | tuple) else value
 
 
+def _refuse_nul(value: Any, file: str | Path, path: tuple[str, ...] = ()) -> None:
+    """Raise CaseError for a text with a NUL character, which neither file names nor result files can hold."""
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            _refuse_nul(str(name), file, (*path, str(name)))
+            _refuse_nul(inner, file, (*path, str(name)))
+    elif isinstance(value, list | tuple):
+        for index, inner in enumerate(value):
+            _refuse_nul(inner, file, (*path, str(index)))
+    elif isinstance(value, str) and "\0" in value:
+        raise CaseError(
+            "a NUL character", file=file, key=".".join(path), got=value, expected="text", cure="remove it"
+        )
+
+
 def _case_file(path: Path) -> Path:
+    if "\0" in str(path):
+        raise CaseError("a NUL character in a path", got=str(path), expected="a case", cure="remove it")
     if path.is_dir():
         if (path / CASE_FILE).is_file():
             return path / CASE_FILE
         others = ", ".join(sorted(file.name for file in path.glob("*.toml"))) or "none"
-        raise CaseError(
-            f"no {CASE_FILE} in this folder", file=path, expected=CASE_FILE, cure=f"*.toml here: {others}"
-        )
+        again = f"a run is here: ancf run {shlex.quote(str(path))} --again repeats it"
+        cure = again if (path / "results.h5").is_file() else f"*.toml here: {others}"
+        raise CaseError(f"no {CASE_FILE} in this folder", file=path, expected=CASE_FILE, cure=cure)
     if path.is_file():
         return path
     raise CaseError(

@@ -2,27 +2,45 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import logging
 import math
 import os
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ancf_petsc.errors import CaseError
+from ancf_petsc.errors import CaseError, cannot_write, error_number
+from ancf_petsc.results.mark import MARK, Mark, read_mark, refuse_live_run
 
-RUN_FILES = ("results.h5", "results.xdmf", "curve.csv", "probes.csv", "summary.json", "log.txt")
+RUN_FILES = (
+    "results.h5", "results.xdmf", "curve.csv", "probes.csv", "modes.csv", "summary.json", "log.txt"
+)  # fmt: skip
 STATUSES = ("done", "stopped", "interrupted")
+log = logging.getLogger("ancf")
 
 
-def check_folder(path: Path, title: str, *, force: bool = False) -> None:
+class Holding(NamedTuple):
+    """The run that a folder holds: its title, and the hash of its case and mesh ("" where none is recorded)."""
+
+    title: str
+    identity: str
+
+
+def check_folder(path: Path, title: str, identity: str = "", *, force: bool = False) -> None:
     """Raise CaseError unless a run of `title` may write into `path`; nothing in it is touched.
 
-    A folder may be new, empty, or hold an earlier run of the same title; `force` allows any other.
+    A folder may be new, empty, or hold an earlier run of the same case: of the same `identity`, a hash of
+    effective case and mesh. `force` allows any other, but never one that a live run writes into.
     """
     path = Path(path)
+    if "\0" in str(path):
+        raise CaseError("a NUL character in a path", key="--out", got=str(path), expected="a folder")
     there = _nearest_existing(path)
     if not there.is_dir():
         what = "is a file" if there == path else f"cannot be made: {there} is a file"
@@ -31,24 +49,42 @@ def check_folder(path: Path, title: str, *, force: bool = False) -> None:
         with tempfile.TemporaryFile(dir=there):
             pass
     except OSError as error:
+        if error_number(error) in (errno.ENOSPC, errno.EDQUOT):
+            raise cannot_write(error, path / "results.h5") from error
         raise CaseError(
             f"cannot be written: {error.strerror or error}",
             file=path,
             key="--out",
             cure="choose a folder you may write to, by --out DIR",
         ) from error
-    if force or there != path or not any(path.iterdir()):
+    if there == path:
+        refuse_live_run(path, force=force)
+        _refuse_other_content(path, Holding(title, identity), force=force)
+
+
+def _refuse_other_content(path: Path, ours: Holding, *, force: bool) -> None:
+    """Raise CaseError where the folder holds anything but an earlier run of the same case."""
+    if force or not any(file.name != MARK for file in path.iterdir()):
         return
-    holds = run_title(path)
-    if holds != title:
-        raise CaseError(
-            "the folder is not empty",
-            file=path,
-            key="--out",
-            got=f"a run of {holds!r}" if holds is not None else "files that do not belong to a run",
-            expected=f"an empty folder, or a run of {title!r}",
-            cure="choose another folder by --out DIR, or overwrite by --force",
-        )
+    held = run_in(path)
+    if held is not None and held.identity == ours.identity and (ours.identity or held.title == ours.title):
+        return
+    got, expected = "files that do not belong to a run", f"an empty folder, or a run of {ours.title!r}"
+    if held is not None:
+        got = f"a run of {held.title!r}"
+        if held.title == ours.title:
+            got += (
+                " with other values or another mesh" if held.identity else ", which did not record its case"
+            )
+            expected = "an empty folder, or a run of exactly this case and mesh"
+    raise CaseError(
+        "the folder is not empty",
+        file=path,
+        key="--out",
+        got=got,
+        expected=expected,
+        cure="keep both by --out DIR, or overwrite by --force",
+    )
 
 
 def _nearest_existing(path: Path) -> Path:
@@ -58,42 +94,83 @@ def _nearest_existing(path: Path) -> Path:
     return path if there == path.absolute() else there
 
 
-def run_title(path: Path) -> str | None:
-    """Title of the run in a folder; None where there is no run."""
+def run_in(path: Path) -> Holding | None:
+    """The run in a folder, finished or not; None where there is none."""
     results = Path(path) / "results.h5"
     if results.is_file():
         import h5py
 
         try:
-            with h5py.File(results, "r", locking=False) as file:
-                return str(file.attrs["title"])
-        except (OSError, KeyError):
-            pass  # broken by a crash: the summary may still tell
+            with unlocked(), h5py.File(results, "r", locking=False) as file:
+                return Holding(str(file.attrs["title"]), str(file.attrs.get("hash", "")))
+        except (OSError, KeyError, RuntimeError):
+            pass  # broken by a crash: summary or mark may still tell
     try:
-        title = json.loads((Path(path) / "summary.json").read_text())["title"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-    return str(title)
+        said = json.loads((Path(path) / "summary.json").read_text(encoding="utf-8"))
+        return Holding(str(said["title"]), str(said.get("hash", "")))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        pass
+    mark = read_mark(path)
+    return Holding(str(mark["title"]), str(mark.get("hash", ""))) if mark and "title" in mark else None
 
 
-def claim_folder(path: Path) -> None:
-    """Make the folder and remove the files of an earlier run; whatever else is in it stays."""
+@contextmanager
+def unlocked() -> Iterator[None]:
+    """Around an opening of an HDF5 file: without HDF5's own locks, which the environment may force on readers.
+
+    What guards the file is `store`'s shared lock: readers pass, another writer does not.
+    """
+    name = "HDF5_USE_FILE_LOCKING"
+    before = os.environ.get(name)
+    os.environ[name] = "FALSE"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
+
+
+def claim_folder(path: Path, title: str = "", identity: str = "", *, force: bool = False) -> Mark:
+    """Make the folder, mark it as a live run's and remove the files of an earlier run; whatever else is in it stays.
+
+    Checks again: since `check_folder` another run may have begun or ended there. Returns the mark, to be
+    released at the end. Raises CaseError, EnvironmentProblem.
+    """
     path = Path(path)
+    mark = Mark(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
+        _refuse_other_content(path, Holding(title, identity), force=force)
+        earlier = run_in(path)
+        mark.take({"title": title, "hash": identity}, force=force)
+        _refuse_other_content(path, Holding(title, identity), force=force)
         for name in RUN_FILES:
             (path / name).unlink(missing_ok=True)
+            (path / f"{name}.part").unlink(missing_ok=True)
+        if earlier is not None:
+            same = "of this case" if earlier.identity == identity else f"{earlier.title!r}, of another case,"
+            log.info("%s: the earlier run %s is replaced", path, same)
     except OSError as error:
-        raise CaseError(
-            f"cannot be written: {error.strerror or error}", file=error.filename or path, key="--out"
-        ) from error
+        mark.release()
+        raise cannot_write(error, error.filename or path) from error
+    except CaseError:
+        mark.release()
+        raise
+    return mark
 
 
 def write_atomic(path: Path, text: str) -> None:
-    """Replace a file as a whole: a reader sees the old text or the new, never a part."""
+    """Replace a file as a whole: a reader sees the old text or the new, never a part. Raises OSError."""
     part = path.with_name(path.name + ".part")
-    part.write_text(text, encoding="utf-8")
-    os.replace(part, path)
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    except OSError:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise
 
 
 def write_summary(

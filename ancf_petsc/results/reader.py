@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ancf_petsc.errors import CaseError, did_you_mean
+from ancf_petsc.results.folder import unlocked
 from ancf_petsc.results.tables import read_table
 from ancf_petsc.results.xdmf import CELL_KINDS, field_name, link_name
 
@@ -34,12 +36,17 @@ class Results:
     title, units, note, kind: as the case and the mesh have them; kind is meshio's name of the cells.
     times: (steps,) pseudo-time of statics, time of motion, one an output.
     extras: attributes of every step.
+    facts: attributes of the file, as text: case, hash, mesh_file, mesh_sha256, date, host, command, versions ...
     fields: names of what every step holds: node_fields over nodes, cell_fields over cells.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.path = folder / "results.h5"
+        if "\0" in str(folder):
+            raise CaseError(
+                "a NUL character in a path", got=str(folder), expected="a folder", cure="remove it"
+            )
         if not self.path.is_file():
             raise CaseError("no results here", file=folder, expected="a folder that `ancf run` has written")
         try:
@@ -53,15 +60,16 @@ class Results:
             ) from error
 
     def _open(self) -> h5py.File:
-        return h5py.File(self.path, "r", locking=False)
+        with unlocked():
+            return h5py.File(self.path, "r", locking=False)
 
     def _read_names(self, file: h5py.File) -> None:
-        self.title = str(file.attrs["title"])
-        self.units = str(file.attrs["units"])
-        self.note = str(file.attrs.get("note", ""))
+        self.facts = {name: _text(file, name) for name in file.attrs}
+        self.title, self.units = self.facts["title"], self.facts["units"]
+        self.note = self.facts.get("note", "")
         self.kind = str(file["mesh"].attrs["kind"])
         steps = file["steps"]
-        self._steps = sorted(steps, key=int)
+        self._steps = sorted((name for name in steps if "time" in steps[name].attrs), key=int)
         self.times = np.array([steps[name].attrs["time"] for name in self._steps], float)
         self.extras = [dict(steps[name].attrs) for name in self._steps]
         self.node_fields = tuple(map(str, steps.attrs.get("node_fields", ())))
@@ -81,8 +89,19 @@ class Results:
 
     @cached_property
     def curve(self) -> Columns:
-        """Columns (rows,) of curve.csv by name."""
+        """Columns (rows,) of curve.csv by name. Raises CaseError where the folder holds modes."""
+        if self.holds_modes:
+            raise CaseError(
+                "modes have no curves",
+                file=self.folder,
+                cure=f"modes.csv has the frequencies, ancf view {shlex.quote(str(self.folder))} the shapes",
+            )
         return read_table(self.folder / "curve.csv")
+
+    @property
+    def holds_modes(self) -> bool:
+        """Whether the steps are shapes of vibration, `times` their numbers and extras their frequencies."""
+        return bool(self.extras) and all("frequency" in extra for extra in self.extras)
 
     @cached_property
     def probes(self) -> Columns:
@@ -153,3 +172,10 @@ class Results:
     def _dataset(self, path: str) -> Array:
         with self._open() as file:
             return file[path][()]
+
+
+def _text(file: h5py.File, name: str) -> str:
+    """An attribute of the file; one too long for HDF5 is a dataset of that name."""
+    if name in file and isinstance(file[name], h5py.Dataset):
+        return str(file[name].asstr()[()])
+    return str(file.attrs[name])

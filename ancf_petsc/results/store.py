@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,15 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ancf_petsc.errors import EnvironmentProblem
+from ancf_petsc.errors import EnvironmentProblem, cannot_write
+from ancf_petsc.results.folder import unlocked
+from ancf_petsc.results.space import Space, lengthen
 from ancf_petsc.results.xdmf import Dataset, Xdmf, link_name
 
 FORMAT = 1
+PER_DATASET = 2048  # bytes that HDF5 takes to describe a dataset, its link and its attributes, at most
+LONGEST_ATTRIBUTE = 60_000  # HDF5 keeps an attribute within 64 KiB
+HDF5_ERRORS = (OSError, RuntimeError, KeyError, ValueError)  # h5py's words for what fails in a file
 Array = NDArray[Any]
 Fields = Mapping[str, Array] | Iterable[tuple[str, Array]]
 
@@ -63,29 +68,43 @@ class ResultStore:
         *,
         note: str = "",
         version: str = "",
+        facts: Mapping[str, str] | None = None,
         parallel: bool | None = None,
     ) -> None:
-        """parallel: write by all ranks (default: where this h5py can) or through the root rank."""
+        """facts: further attributes, on the root rank. parallel: write by all ranks (default: where this h5py
+        can) or through the root rank. Raises EnvironmentProblem.
+        """
         self.path = Path(folder) / "results.h5"
         self.comm = comm
         self.parallel = comm.size > 1 and (h5py.get_config().mpi if parallel is None else parallel)
         self.steps = 0
+        self._space = Space(self.path)
+        self._held: list[h5py.h5d.DatasetID] = []  # of the open file, until all is written
         self._xdmf = Xdmf(self.path.with_suffix(".xdmf"), self.path.name)
         attributes = {"title": title, "units": units, "note": note, "format": FORMAT, "version": version}
+        attributes |= comm.bcast(dict(facts or {}))
         self._access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
         self._access.set_fclose_degree(h5py.h5f.CLOSE_STRONG)
         with self._agreed():
             if self.parallel:
                 self._access.set_fapl_mpio(comm, MPI.Info())
-            elif hasattr(
-                self._access, "set_file_locking"
-            ):  # a viewer that holds the file does not stop the run
+            elif hasattr(self._access, "set_file_locking"):  # later HDF5 than Debian 12's first
                 self._access.set_file_locking(False, False)
+        with self._agreed():
+            if comm.rank == 0:
+                self._space.create()
+        with self._agreed(), unlocked():
             if self.parallel or comm.rank == 0:
                 h5py.h5f.create(os.fsencode(self.path), h5py.h5f.ACC_TRUNC, fapl=self._access).close()
-        with self._open() as file:
+        self._reserve(sum(len(value.encode()) for value in map(str, attributes.values())))
+        with self._open() as file, self._agreed():
             if file:
-                file.attrs.update(attributes)
+                for name, value in attributes.items():
+                    _put_attribute(file, name, value)
+
+    def close(self) -> None:
+        """Let other programs write to the file again. Not collective."""
+        self._space.close()
 
     def write_mesh(
         self,
@@ -113,28 +132,41 @@ class ResultStore:
         for name, size in sizes.items():
             mine = groups.get(name, np.empty(0, np.int64))
             tables.append(_numbers(f"/mesh/groups/{link_name(name)}", mine, Slab(0, len(mine), size)))
+        self._reserve(sum(8 * math.prod(table.dataset.shape) + PER_DATASET for table in tables))
         with self._open() as file:
-            if file:
-                file.create_group("/mesh/groups")
-                file.create_group("/steps")
-                file["mesh"].attrs["kind"] = kind
+            with self._agreed():
+                if file:
+                    file.create_group("/mesh/groups")
+                    file.create_group("/steps")
+                    file["mesh"].attrs["kind"] = kind
             self._write(file, tables)
         self._xdmf.set_mesh(kind, where, topology)
+
+    def prepare_step(self, node_fields: Mapping[str, int], cell_fields: Mapping[str, int]) -> None:
+        """Reserve the space of a step, given by names and numbers a row. Raises EnvironmentProblem, where there
+        is none, before anything of the step is written.
+        """
+        rows = ((self._nodes.total, node_fields), (self._cells.total, cell_fields))
+        self._reserve(
+            sum(8 * total * width + PER_DATASET for total, widths in rows for width in widths.values())
+        )
 
     def write_step(
         self, time: float, node_fields: Fields, cell_fields: Fields, extra: Mapping[str, Any] | None = None
     ) -> None:
         """Fields (slab, ...) by name over nodes and cells; extra: attributes, the same on all ranks.
 
-        Fields may be pairs that are made one after the other: each is written before the next is asked for.
+        Fields may be pairs that are made one after the other: each is written before the next is asked for;
+        `prepare_step` has to reserve their space.
         """
+        if isinstance(node_fields, Mapping) and isinstance(cell_fields, Mapping):
+            self.prepare_step(_widths(node_fields), _widths(cell_fields))
         where = f"/steps/{self.steps:05d}"
         written: list[Dataset] = []
         with self._open() as file:
             with self._agreed():
                 if file:
                     group = h5py.Group(h5py.h5g.create(file.id, where.encode()))
-                    _put_number(group, "time", time)
                     for name, value in (extra or {}).items():
                         group.attrs[name] = value
             for centre, slab, fields in (
@@ -147,14 +179,22 @@ class ResultStore:
                     written.append(table.dataset)
                     del table, rows  # before the next is made
             with self._agreed():
+                if file:  # last: a step without its time is not whole
+                    _put_number(group, "time", time)
                 if file and self.steps == 0:
                     for key, centre in (("node_fields", "Node"), ("cell_fields", "Cell")):
                         file["steps"].attrs[key] = [each.name for each in written if each.centre == centre]
         self._xdmf.add_step(float(time), written)
-        with self._agreed():
+        with self._agreed(self._xdmf.path):
             if self.comm.rank == 0:
                 self._xdmf.write()
         self.steps += 1
+
+    def _reserve(self, size: int) -> None:
+        """Have the disk keep `size` bytes and a little more for what is written next."""
+        with self._agreed():
+            if self.comm.rank == 0:
+                self._space.reserve(size)
 
     def _slab(self, rows: int) -> Slab:
         before = self.comm.exscan(rows)
@@ -165,19 +205,28 @@ class ResultStore:
     def _open(self) -> Iterator[h5py.File | None]:
         """The file, on every rank that writes."""
         file = None
-        with self._agreed():
-            if self.parallel or self.comm.rank == 0:
-                number = h5py.h5f.open(os.fsencode(self.path), h5py.h5f.ACC_RDWR, self._access)
-                file = h5py.File(number)
         try:
+            with self._agreed(), unlocked():
+                if self.parallel or self.comm.rank == 0:
+                    number = h5py.h5f.open(os.fsencode(self.path), h5py.h5f.ACC_RDWR, self._access)
+                    file = h5py.File(number)
             yield file
+            with self._agreed():  # while all objects are open: HDF5 reports no failure as one is closed
+                if file:
+                    h5py.h5f.flush(file.id)
+            self._held.clear()
+            with self._agreed():
+                if file:
+                    file.id.close()
         except EnvironmentProblem:  # of all ranks; any other error is of this one alone, and closing waits
-            if file:
-                file.id.close()
+            self._space.divert()
+            with suppress(*HDF5_ERRORS):
+                self._held.clear()
+                if file:
+                    file.close()
+            if self.comm.rank == 0:
+                lengthen(self.path)
             raise
-        with self._agreed():
-            if file:
-                file.id.close()
 
     def _write(self, file: h5py.File | None, tables: list[Share]) -> None:
         """Make all datasets and write slabs; the root rank writes for all where this h5py cannot in parallel."""
@@ -186,7 +235,7 @@ class ResultStore:
                 self._write_through_root(file, tables)
             return
         with self._agreed():  # collective
-            made = [_create(file, table) for table in tables] if file else []
+            made = [self._create(file, table) for table in tables] if file else []
         with self._agreed():
             for data, table in zip(made, tables, strict=True):
                 _write_rows(data, table.slab.start, table.rows)
@@ -198,7 +247,7 @@ class ResultStore:
             for table in tables:
                 self.comm.Send(table.rows, 0)
             return
-        problem: OSError | RuntimeError | None = None
+        problem: Exception | None = None
         for index, table in enumerate(tables):
             data = None
             for rank, place in enumerate(places):
@@ -207,29 +256,41 @@ class ResultStore:
                 if rank:
                     self.comm.Recv(rows, rank)
                 try:
-                    data = data or _create(file, table)
+                    data = data or self._create(file, table)
                     _write_rows(data, start, rows)
-                except (OSError, RuntimeError) as error:
+                except HDF5_ERRORS as error:
+                    self._space.divert()
                     problem = problem or error  # the others still send: take it all, then tell
         if problem:
             raise problem
+
+    def _create(self, file: h5py.File, table: Share) -> h5py.h5d.DatasetID:
+        """h5py's low-level calls: half the time of its datasets, which counts where steps are many and small."""
+        kind = h5py.h5t.py_create(table.rows.dtype)
+        space = h5py.h5s.create_simple(table.dataset.shape)
+        data = h5py.h5d.create(file.id, table.dataset.path.encode(), kind, space)
+        self._held.append(data)
+        return data
 
     def _gathered(self, value: Any) -> list[Any]:
         """Of all ranks, on the root rank."""
         return [value] if self.comm.size == 1 else self.comm.gather(value) or []
 
     @contextmanager
-    def _agreed(self) -> Iterator[None]:
+    def _agreed(self, path: Path | None = None) -> Iterator[None]:
         """What fails on one rank is raised on all, so that none waits for the others."""
-        problem = ""
+        problem = None
         try:
             yield
-        except (OSError, RuntimeError) as error:  # h5py's two words for a write that failed
-            problem = str(error)
+        except EnvironmentProblem as error:
+            problem = error
+        except HDF5_ERRORS as error:
+            problem = cannot_write(error, path or self.path)
+            self._space.divert()  # before objects of HDF5 go out of use with what they could not write
         problems = [problem] if self.comm.size == 1 else self.comm.allgather(problem)
-        if any(problems):
-            reason = next(filter(None, problems))
-            raise EnvironmentProblem(f"{self.path}: cannot be written: {reason}; look for space on the disk")
+        first = next((one for one in problems if one is not None), None)
+        if first is not None:
+            raise first
 
 
 def _field(path: str, rows: Array, slab: Slab, centre: str) -> Share:
@@ -243,17 +304,23 @@ def _numbers(path: str, rows: Array, slab: Slab) -> Share:
     return Share(Dataset(path, (slab.total,), integer=True), np.ascontiguousarray(rows, np.int64), slab)
 
 
+def _widths(fields: Mapping[str, Array]) -> dict[str, int]:
+    """Numbers a row of each field."""
+    return {name: math.prod(np.shape(rows)[1:]) for name, rows in fields.items()}
+
+
+def _put_attribute(file: h5py.File, name: str, value: Any) -> None:
+    """An attribute; a text too long for one becomes a dataset, which the attribute names."""
+    if isinstance(value, str) and len(value.encode()) > LONGEST_ATTRIBUTE:
+        file[name] = value
+        value = f"see the dataset /{name}"
+    file.attrs[name] = value
+
+
 def _put_number(group: h5py.Group, name: str, value: float) -> None:
     """An attribute, by low-level calls."""
     space = h5py.h5s.create(h5py.h5s.SCALAR)
     h5py.h5a.create(group.id, name.encode(), h5py.h5t.NATIVE_DOUBLE, space).write(np.array(value, float))
-
-
-def _create(file: h5py.File, table: Share) -> h5py.h5d.DatasetID:
-    """h5py's low-level calls: half the time of its datasets, which counts where steps are many and small."""
-    kind = h5py.h5t.py_create(table.rows.dtype)
-    space = h5py.h5s.create_simple(table.dataset.shape)
-    return h5py.h5d.create(file.id, table.dataset.path.encode(), kind, space)
 
 
 def _write_rows(data: h5py.h5d.DatasetID, start: int, rows: Array) -> None:

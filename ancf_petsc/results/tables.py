@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
+import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Self
 
@@ -22,7 +25,7 @@ class CsvTable:
         self.columns = tuple(columns)
         if len(set(self.columns)) != len(self.columns):
             raise ValueError(f"{self.path}: a column is named twice: {self.columns}")
-        self._file = self.path.open("wb", buffering=0)  # unbuffered: one line, one write
+        self._file = io.FileIO(self.path, "w")  # unbuffered: one line, one write
         self._write(self.columns)
 
     def append(self, row: Mapping[str, float] | Sequence[float]) -> None:
@@ -49,7 +52,28 @@ class CsvTable:
     def _write(self, words: Sequence[str]) -> None:
         line = io.StringIO()
         csv.writer(line, lineterminator="\n").writerow(words)
-        self._file.write(line.getvalue().encode())
+        write_whole(self._file, line.getvalue().encode())
+
+
+def write_whole(file: io.FileIO, text: bytes, end: bytes = b"") -> None:
+    """Write at the file's place, all of it or nothing: a file without space is as before, its last bytes `end`.
+
+    Raises OSError; a disk that runs full takes a part without a word first.
+    """
+    place = file.tell()
+    try:
+        rest = memoryview(text)
+        while rest:
+            written = file.write(rest)
+            if not written:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            rest = rest[written:]
+    except OSError:
+        with suppress(OSError):
+            file.seek(place)
+            file.write(end)
+            file.truncate()
+        raise
 
 
 def _exact(value: float) -> str:
@@ -65,8 +89,9 @@ def read_table(path: Path) -> dict[str, NDArray[np.float64]]:
         text = Path(path).read_text(encoding="utf-8")
     except OSError as error:
         raise CaseError(f"cannot be read: {error.strerror}", file=path) from error
-    header, _, body = text[: text.rfind("\n") + 1].partition("\n")
-    names = next(csv.reader([header]), [])
+    lines = io.StringIO(text[: text.rfind("\n") + 1], newline="")
+    names = next(csv.reader(lines), [])  # quoted ones may hold line breaks
+    body = lines.read()
     if not body:
         return {name: np.empty(0) for name in names}
     try:

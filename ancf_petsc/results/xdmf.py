@@ -6,14 +6,14 @@ Format: XDMF 3, https://xdmf.org/index.php/XDMF_Model_and_Format, of which only 
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
-from errno import ENOSPC
-from os import strerror
 from pathlib import Path
 from urllib.parse import unquote
 from xml.sax.saxutils import escape, quoteattr
 
 from ancf_petsc.results.folder import write_atomic
+from ancf_petsc.results.tables import write_whole
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,9 @@ CELL_KINDS = {  # by meshio's names
 }
 
 
+NO_NAME = "%"  # a link that no name becomes
+
+
 @dataclass(frozen=True)
 class Dataset:
     """One HDF5 dataset: its path in the file, shape, whether whole numbers, and where it lives."""
@@ -64,13 +67,19 @@ class Dataset:
 
 
 def link_name(name: str) -> str:
-    """A name as one HDF5 link that XDMF can point to: slash and colon mean something else there."""
-    for mark in "%/:":
-        name = name.replace(mark, f"%{ord(mark):02X}")
-    return name
+    """A name as one HDF5 link that XDMF can point to.
+
+    Slash and colon mean something else there, so do a lone dot and no name at all; a NUL ends a name.
+    """
+    if not name:
+        return NO_NAME
+    marks = "." if not name.strip(".") else "%/:"
+    return "".join(f"%{ord(c):02X}" if c in marks or c < " " or c == "\x7f" else c for c in name)
 
 
-field_name = unquote
+def field_name(link: str) -> str:
+    """The name that `link_name` made a link of."""
+    return "" if link == NO_NAME else unquote(link)
 
 
 def attribute_type(components: tuple[int, ...]) -> str:
@@ -131,13 +140,6 @@ class Xdmf:
 
     def _replace_end(self, text: bytes) -> None:
         """Write over the closing tags, which come back if there is no space."""
-        with self.path.open("r+b", buffering=0) as file:
+        with io.FileIO(self.path, "r+") as file:
             file.seek(self._end)
-            try:
-                if file.write(text) < len(text):
-                    raise OSError(ENOSPC, strerror(ENOSPC))
-            except OSError:
-                file.seek(self._end)
-                file.write(TAIL.encode())
-                file.truncate()
-                raise
+            write_whole(file, text, end=TAIL.encode())

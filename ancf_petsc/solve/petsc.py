@@ -1,31 +1,98 @@
 """PETSc's options: the one place that reads and writes them.
 
 The options of a case and of the command line have the last word: solvers set their defaults first and call
-`setFromOptions` after. An option that no solver asked for is an error.
+`setFromOptions` after. An option that no solver asked for is an error: at once where PETSc has none of that name,
+else at the end of the run, for many are read during the solution only.
 """
 
 from __future__ import annotations
 
 import ctypes
+import logging
+import re
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from difflib import get_close_matches
+from functools import cache
+from pathlib import Path
 
+import petsc4py
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from ancf_petsc.errors import CaseError
+from ancf_petsc.launcher import is_general_option
+
+PREFIX = re.compile(
+    r"(system_|partition_|modes_|mg_(levels|coarse|fine)_(\d+_)?|sub_|redundant_|telescope_|inner_|npc_"
+    r"|fieldsplit_[a-z0-9]+_|st_|smoother_)"
+)
+NUMBER = re.compile(r"\d+")
+READ_LATE = re.compile(r"view|reason|monitor|draw|plot|mat_|test|check")  # during the solution or after it
+log = logging.getLogger("ancf")
 
 
 @contextmanager
-def petsc_options(given: Mapping[str, object]) -> Iterator[None]:
-    """Put options into PETSc's database for the time of one run. Collective."""
+def petsc_options(given: Mapping[str, object]) -> Iterator[GivenOptions]:
+    """Put options into PETSc's database for the time of one run. Collective.
+
+    PETSc's general options, such as -log_view and -options_left, stay: it reads them at the end of the process.
+    """
     database = PETSc.Options()
     for name, value in given.items():
         database.setValue(name, _text(value))
+    if given.get("log_view") is not None and not PETSc.Log.isActive():
+        PETSc.Log.begin()
     try:
-        yield
+        yield GivenOptions(given)
     finally:
         for name in given:
-            database.delValue(name)
+            if not is_general_option(name):
+                database.delValue(name)
+
+
+class GivenOptions:
+    """The options of a run, and which of them nothing has asked for. PETSc's general options are left out."""
+
+    def __init__(self, given: Mapping[str, object]) -> None:
+        self.given = {name: value for name, value in given.items() if not is_general_option(name)}
+
+    def unused(self, comm: MPI.Comm) -> list[str]:
+        """Names of the options that no PETSc object of any rank has asked for so far. Collective."""
+        used = comm.allgather([name for name in self.given if _used(name)])
+        return [name for name in self.given if not any(name in names for names in used)]
+
+    def refuse_unknown(self, comm: MPI.Comm) -> None:
+        """Collective, after the solvers are set up: raise CaseError for an unused option whose name PETSc does not know.
+
+        Others may be asked for during the solution, as -snes_converged_reason is; a warning names those of
+        which that is not to be expected.
+        """
+        unused = self.unused(comm)
+        unknown = [name for name in unused if not is_known_option(name)]
+        if unknown:
+            raise self._refusal(unknown, nearest_option(unknown[0]))
+        late = [name for name in unused if not READ_LATE.search(name)]
+        if late and comm.rank == 0:
+            log.warning(
+                "petsc.%s: no solver has asked for it so far; if none does, the run ends with an error",
+                ", petsc.".join(late),
+            )
+
+    def refuse_unused(self, comm: MPI.Comm) -> None:
+        """Collective, after the solution: raise CaseError for options nobody asked for."""
+        if unused := self.unused(comm):
+            known = is_known_option(unused[0])
+            raise self._refusal(unused, "take it out" if known else nearest_option(unused[0]))
+
+    def _refusal(self, names: list[str], cure: str) -> CaseError:
+        return CaseError(
+            "no solver of this run uses it",
+            key=f"petsc.{names[0]}",
+            got=self.given[names[0]],
+            expected="an option of PETSc's SNES, TS, KSP, PC, Mat or MatPartitioning in use here",
+            cure=cure + (f" (and {len(names) - 1} more)" if names[1:] else ""),
+        )
 
 
 @contextmanager
@@ -34,7 +101,7 @@ def default_options(defaults: Mapping[str, object]) -> Iterator[None]:
     stay stronger.
     """
     database = PETSc.Options()
-    added = [name for name in defaults if not database.hasName(name)]
+    added = [name for name in defaults if not is_given(name)]
     for name in added:
         database.setValue(name, _text(defaults[name]))
     try:
@@ -60,8 +127,8 @@ def refuse_wrong_values(given: Mapping[str, object]) -> Iterator[None]:
 
 
 def is_given(name: str) -> bool:
-    """Whether the case or the command line says anything about an option."""
-    return PETSc.Options().hasName(name)
+    """Whether the case or the command line says anything about an option. The question is no use of it."""
+    return name in PETSc.Options().getAll()
 
 
 def begins_a_given_option(*prefixes: str) -> bool:
@@ -69,22 +136,56 @@ def begins_a_given_option(*prefixes: str) -> bool:
     return any(name.startswith(prefixes) for name in PETSc.Options().getAll())
 
 
-def unused_options(given: Mapping[str, object]) -> list[str]:
-    """Names of the options that no PETSc object has asked for so far."""
-    return [name for name in given if not _used(name)]
+def is_known_option(name: str) -> bool:
+    """Whether PETSc has an option of this name, whatever object of this program or of PETSc it is meant for."""
+    names = option_names()
+    if not names:
+        return READ_LATE.search(name) is not None
+    plain = without_prefix(name)
+    return any(word in names for word in (plain, NUMBER.sub("%d", plain), name))
 
 
-def refuse_unused(given: Mapping[str, object]) -> None:
-    """Raise CaseError for options nobody asked for."""
-    unused = unused_options(given)
-    if unused:
-        raise CaseError(
-            "no solver of this run uses it",
-            key=f"petsc.{unused[0]}",
-            got=given[unused[0]],
-            expected="an option of PETSc's SNES, TS, KSP, PC or MatPartitioning in use here",
-            cure="take it out or correct its name" + (f" (and {len(unused) - 1} more)" if unused[1:] else ""),
-        )
+def nearest_option(name: str) -> str:
+    """A cure for a misspelt option."""
+    plain = without_prefix(name)
+    close = get_close_matches(plain, option_names(), n=1, cutoff=0.7)
+    if not close:
+        return "take it out or correct its name"
+    return f"did you mean {name[: len(name) - len(plain)] + close[0]!r}?"
+
+
+def without_prefix(name: str) -> str:
+    """An option's name without the prefixes of objects of this program and of PETSc's nested solvers."""
+    name = name.lower()
+    while (found := PREFIX.match(name)) and found.end() < len(name):
+        name = name[found.end() :]
+    return name
+
+
+@cache
+def option_names() -> frozenset[str]:
+    """All names of options that PETSc's and SLEPc's libraries hold as text; numbers within them as %d.
+
+    PETSc has no list of its options: each object knows its own when it is set up.
+    """
+    names: set[str] = set()
+    for library in _libraries():
+        with suppress(OSError):
+            found = re.findall(rb"(?<![\w-])-([A-Za-z][\w%]{2,60})\0", library.read_bytes())
+            names |= {word.decode().lower() for word in found}
+    return frozenset(names)
+
+
+def _libraries() -> list[Path]:
+    """Files of this process's PETSc and SLEPc."""
+    try:
+        lines = Path("/proc/self/maps").read_text().splitlines()
+        found = {line.split(maxsplit=5)[-1] for line in lines if re.search(r"/lib(petsc|slepc)[^/]*$", line)}
+    except OSError:
+        settings = petsc4py.get_config()
+        places = Path(settings.get("PETSC_DIR", ".")) / settings.get("PETSC_ARCH", "") / "lib"
+        found = {str(path) for path in places.glob("libpetsc*")}
+    return [Path(name) for name in sorted(found)] or [Path(PETSc.__file__)]
 
 
 def _text(value: object) -> str:

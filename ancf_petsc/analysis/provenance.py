@@ -1,0 +1,134 @@
+"""What a run says of itself: the effective case, its mesh, when, where and by what it was computed."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import shlex
+import socket
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from ancf_petsc.analysis.host.versions import versions
+from ancf_petsc.analysis.identity import Identity, identity
+from ancf_petsc.errors import CaseError
+from ancf_petsc.input.load import Case, case_from_text
+from ancf_petsc.log import RECORD
+
+log = logging.getLogger(RECORD)
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Of one run. command: the words that started it, quoted for a shell."""
+
+    case: Case
+    identity: Identity
+    date: str
+    host: str
+    command: str
+    ranks: int
+    versions: dict[str, str]
+
+    def summary(self) -> dict[str, Any]:
+        """For summary.json."""
+        return {
+            "hash": self.identity.hash,
+            "case": {
+                "file": str(self.case.file.resolve()) if self.case.file else "",
+                "folder": str(self.case.folder),
+                "name": self.case.name,
+                "text": self.case.text,
+            },
+            "mesh": {"file": str(self.case.mesh_file), "sha256": self.identity.mesh},
+            "date": self.date,
+            "host": self.host,
+            "command": self.command,
+            "versions": self.versions,
+        }
+
+    def attributes(self) -> dict[str, str]:
+        """For results.h5: one text each."""
+        said = self.summary()
+        case, mesh = said.pop("case"), said.pop("mesh")
+        return {
+            **{f"mesh_{name}": value for name, value in mesh.items()},
+            **{f"case_{name}": value for name, value in case.items() if name != "text"},
+            "case": case["text"],
+            **{name: value if isinstance(value, str) else json.dumps(value) for name, value in said.items()},
+            "ranks": str(self.ranks),
+        }
+
+    def write_log(self) -> None:
+        """Lines for log.txt."""
+        ranks = f"{self.ranks} rank{'s' * (self.ranks > 1)}"
+        log.info("%s on %s, %s: %s", self.date, self.host, ranks, self.command)
+        log.info("%s", ", ".join(f"{name} {version}" for name, version in self.versions.items()))
+        log.info("mesh %s, sha256 %s", self.case.mesh_file, self.identity.mesh)
+        log.info("case %s, hash %s; with all changes it reads", self.case.file or "", self.identity.hash)
+        for line in self.case.text.splitlines():
+            log.info("    %s", line)
+
+
+def provenance_of(case: Case, ranks: int) -> Provenance:
+    """Of a run of `case` that begins now in this process. Raises MeshError."""
+    now = datetime.now().astimezone().isoformat("T", "seconds")
+    words = [os.path.basename(sys.argv[0]) or "python", *sys.argv[1:]]
+    return Provenance(case, identity(case), now, socket.gethostname(), shlex.join(words), ranks, versions())
+
+
+def case_of_run(folder: str | Path, overrides: Sequence[str] = (), petsc_options: Sequence[str] = ()) -> Case:
+    """The effective case that the run in a folder computed, with further changes. Raises CaseError.
+
+    The mesh has to be the same, byte for byte, unless a change names another.
+    """
+    folder = Path(folder)
+    said = _recorded(folder)
+    case = case_from_text(said["text"], folder, Path(said["folder"]), said["name"], overrides, petsc_options)
+    if str(Path(said["mesh_file"])) != str(case.mesh_file):
+        return case
+    cure = "bring that file back, or name the mesh by --set mesh.file=FILE"
+    if not case.mesh_file.is_file():
+        raise CaseError("the mesh of this run is gone", file=case.mesh_file, key="--again", cure=cure)
+    if identity(case).mesh != said["mesh_sha256"]:
+        raise CaseError(
+            "the mesh is not the one of this run any more",
+            file=case.mesh_file,
+            key="--again",
+            expected=f"sha256 {said['mesh_sha256']}",
+            cure=cure,
+        )
+    return case
+
+
+def _recorded(folder: Path) -> dict[str, str]:
+    """text, folder, name, mesh_file, mesh_sha256 of a run: from its summary, or from its results if it was cut short."""
+    try:
+        said = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        case, mesh = said["case"], said["mesh"]
+        found = {**case, "mesh_file": mesh["file"], "mesh_sha256": mesh["sha256"]}
+        return {name: str(value) for name, value in found.items()}
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    from ancf_petsc.results.reader import open_results
+
+    facts = open_results(folder).facts
+    if "case" not in facts:
+        raise CaseError(
+            "this run did not record its case",
+            file=folder,
+            key="--again",
+            cure="it is of an earlier version: run the case file",
+        )
+    return {
+        "text": facts["case"],
+        "folder": facts["case_folder"],
+        "name": facts["case_name"],
+        "mesh_file": facts["mesh_file"],
+        "mesh_sha256": facts["mesh_sha256"],
+    }
