@@ -85,6 +85,49 @@ def test_compression_is_drawn_upwards_with_units_and_note(block):
     assert words(figure) == (["sum of internal forces"], run.NOTE)
 
 
+@pytest.mark.parametrize(
+    "title", ["5$ and 7$", "A $_$ B, 5 &", r"cost $^$ \frac{", "_hidden", "two\nlines", r"5\$"]
+)
+def test_titles_notes_and_names_are_drawn_as_typed(title, block, tmp_path, recwarn):
+    """Dollars make no formula, an underscore at the start no legend without the run."""
+    block.title = block.note = title
+    other = tmp_path / title.replace("/", "")
+    run.write(other, MPI.COMM_SELF)
+    second = open_results(other)
+    second.title, second.note = "another", title
+    figure = figures.force_stroke([block, second])
+    figures.save({"a": figure, "b": figures.force_stroke([block])}, tmp_path, "png")
+    assert not [one for one in recwarn if "label" in str(one.message)]
+    texts = [figure.legends[0].get_texts()[0], figure._supxlabel]
+    assert [text._preprocess_math(text.get_text()) for text in texts] == [(as_drawn(title), False)] * 2
+
+
+def as_drawn(title):
+    return f" {title}" if title.startswith("_") else title
+
+
+def test_a_line_break_in_a_name_comes_through_table_and_figure(block, tmp_path):
+    name = "tip, 1\n(upper) $x$"
+    _write(
+        block.folder / "probes.csv",
+        {"pseudo_time": [0.0, 1.0], f"{name}.z": [1.0, 2.0], f"{name}.uz": [0.0, 1.0]},
+    )
+    table = open_results(block.folder).probes
+    assert table[f"{name}.uz"].tolist() == [0.0, 1.0]
+    probes = ["--probe", f"{name}.z", "--probe", f"{name}.uz"]
+    assert main(["plot", str(block.folder), *probes, "--out", str(tmp_path / "p")]) == 0
+    assert main(["plot", str(block.folder), "--out", str(tmp_path / "p")]) == 0
+    (path,) = (tmp_path / "p").glob("tip*")
+    assert path.name == "tip_1_upper_x_.z_tip_1_upper_x_.uz.png"
+
+
+def test_explicit_motion_has_no_panel_of_iterations(block):
+    """It never iterates: a column of zeros is no picture."""
+    block.curve["newton_iterations"] *= 0
+    (axes,) = figures.steps([block]).axes
+    assert axes.get_ylabel() == "smallest det F"
+
+
 def test_runs_share_axes_and_are_named(block, tmp_path):
     run.write(tmp_path / "other", MPI.COMM_SELF)
     figure = figures.force_stroke([block, open_results(tmp_path / "other")])

@@ -15,7 +15,7 @@ from ancf_petsc.axes import AXES
 from ancf_petsc.mesh.groups import surface_of
 from ancf_petsc.mesh.mesh import Group, Mesh
 from ancf_petsc.post.panels import COLOURS
-from ancf_petsc.post.scene import DARK, MANY_CELLS, frame, make_plotter, matt, surface, write_texts
+from ancf_petsc.post.scene import DARK, MANY_CELLS, frame, make_plotter, matt, one_line, surface, write_texts
 from ancf_petsc.results.xdmf import CELL_KINDS
 
 Points = NDArray[np.float64]
@@ -78,7 +78,7 @@ def _add_label(plotter: pyvista.Plotter, place: Points, text: str, colour: str) 
     pale = 0.35 * np.array(pyvista.Color(colour).float_rgb) + 0.65
     plotter.add_point_labels(
         [place],
-        [text],
+        [one_line(text)],
         show_points=False,
         always_visible=True,
         font_size=19,
@@ -101,11 +101,17 @@ def _words(mesh: Mesh, supports: Sequence[Marked]) -> dict[str, str]:
 
 
 def _shown(mesh: Mesh, supports: Sequence[Marked]) -> list[Group]:
-    """Groups of the case's supports first; whole bodies are no news."""
+    """Groups of the case's supports first. Whole bodies are left out, and second names of the same nodes: their labels
+    would lie on each other.
+    """
     used = dict.fromkeys(support.group for support in supports)
-    names = [*used, *(name for name in mesh.groups if name not in used)]
-    groups = [mesh.groups[name] for name in names]
-    return [group for group in groups if len(group.nodes) < mesh.used.sum()]
+    shown: dict[bytes, Group] = {}
+    for name in [*used, *(name for name in mesh.groups if name not in used)]:
+        group = mesh.groups[name]
+        if len(group.nodes) < mesh.used.sum():
+            shown.setdefault(name.encode() if name in used else group.nodes.tobytes(), group)
+            shown.setdefault(group.nodes.tobytes(), group)
+    return list({id(group): group for group in shown.values()}.values())
 
 
 def _shape(mesh: Mesh, group: Group) -> pyvista.PolyData:

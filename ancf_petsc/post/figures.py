@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -9,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ancf_petsc.errors import CaseError, did_you_mean
+from ancf_petsc.errors import CaseError, did_you_mean, writing
 from ancf_petsc.post.curves import is_compression
 from ancf_petsc.post.panels import (
     Columns,
@@ -26,7 +28,7 @@ from ancf_petsc.post.panels import (
     time_of,
 )
 from ancf_petsc.post.reference import Level
-from ancf_petsc.post.units import with_unit
+from ancf_petsc.post.units import as_typed, with_unit
 
 FORCES = {"force": "sum of internal forces", "force_stress_area": "stress times area"}
 ENERGIES = {
@@ -56,11 +58,18 @@ def figures_of(runs: Runs) -> dict[str, Figure]:
 def save(figures: dict[str, Figure], folder: Path, suffix: str) -> list[Path]:
     """Write each as folder/NAME.suffix; the files written."""
     folder.mkdir(parents=True, exist_ok=True)
-    paths = [folder / f"{name}.{suffix}" for name in figures]
+    paths = [folder / f"{file_name(name)}.{suffix}" for name in figures]
     for path, figure in zip(paths, figures.values(), strict=True):
-        with style():
-            figure.savefig(path)
+        with style(), warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Glyph .* missing from")  # drawn as a box, said by the picture
+            with writing(path, "--out"):
+                figure.savefig(path)
     return paths
+
+
+def file_name(name: str) -> str:
+    """A name of columns as one of a file."""
+    return re.sub(r"[^\w.+=-]+", "_", name)[:100]
 
 
 def force_stroke(runs: Runs) -> Figure | None:
@@ -151,7 +160,7 @@ def components(runs: Runs, columns: Sequence[str], levels: Sequence[Level] = ())
             draw(axes, [run.probes for run in runs], {column: ""})
             probe, _, axis = column.rpartition(".")
             words = f"{axis[-1]} {'displacement' if axis.startswith('u') else 'position'}"
-            axes.set_ylabel(f"{probe}: {with_unit(words, common_units(runs).length)}")
+            axes.set_ylabel(f"{as_typed(probe)}: {with_unit(words, common_units(runs).length)}")
         draw_levels(places[-1], levels)
         finish(figure, places, runs, {})
     return figure
@@ -177,7 +186,11 @@ def momentum(runs: Runs) -> Figure | None:
 def steps(runs: Runs) -> Figure | None:
     """How the solution went: smallest det F, and Newton iterations since the row before."""
     curves = [run.curve for run in runs]
-    quantities: Quantities = {name: words for name, words in STEPS.items() if any(name in c for c in curves)}
+    quantities: Quantities = {
+        name: words
+        for name, words in STEPS.items()
+        if any(name in curve and np.any(curve[name]) for curve in curves)  # explicit motion iterates never
+    }
     if not quantities:
         return None
     with style():

@@ -19,7 +19,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from ancf_petsc.post.reference import Level, ReferenceCurve
-from ancf_petsc.post.units import Units, read_units, with_unit
+from ancf_petsc.post.units import Units, as_typed, read_units, with_unit
 from ancf_petsc.results.reader import Results
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -101,7 +101,7 @@ def draw_levels(axes: Axes, levels: Sequence[Level]) -> None:
     for level in levels:
         axes.axhline(level.value, color=GREY, linestyle=(0, (4, 3)), linewidth=1.0)
         axes.annotate(
-            f"{level.label}: {level.value:g}",
+            f"{as_typed(level.label)}: {level.value:g}",
             (0.99, level.value),
             xycoords=("axes fraction", "data"),
             xytext=(0, 2),
@@ -119,7 +119,7 @@ def time_of(table: Curves) -> Columns:
 def finish(figure: Figure, axes: Sequence[Axes], runs: Runs, quantities: Quantities) -> None:
     """Title, words of the time axis, one legend beside the axes, the runs' notes below."""
     if len(runs) == 1:
-        axes[0].set_title(runs[0].title)
+        axes[0].set_title(as_typed(runs[0].title))
     if not axes[-1].get_xlabel():
         motion = any("time" in run.curve for run in runs)
         axes[-1].set_xlabel(with_unit("time", common_units(runs).time) if motion else "pseudo-time")
@@ -128,7 +128,7 @@ def finish(figure: Figure, axes: Sequence[Axes], runs: Runs, quantities: Quantit
         figure.legend(handles=handles, loc="outside right upper")
     notes = list(dict.fromkeys(run.note for run in runs if run.note))
     if notes:
-        figure.supxlabel("\n".join(notes), fontsize=7.5, color=GREY, x=0.015, ha="left")
+        figure.supxlabel(as_typed("\n".join(notes)), fontsize=7.5, color=GREY, x=0.015, ha="left")
 
 
 def _legend(runs: Runs, quantities: Quantities) -> list[Line2D]:
@@ -137,14 +137,14 @@ def _legend(runs: Runs, quantities: Quantities) -> list[Line2D]:
     lines = []
     if several:
         lines = [
-            Line2D([], [], color=colour, label=name)
+            Line2D([], [], color=colour, label=as_typed(name))
             for name, colour in zip(run_names(runs), cycle(COLOURS), strict=False)
         ]
     words = [word for word in quantities.values() if word]
     if several and len(words) < 2:
         return lines
     return lines + [
-        Line2D([], [], color=GREY if several else colour, linestyle=line, label=word)
+        Line2D([], [], color=GREY if several else colour, linestyle=line, label=as_typed(word))
         for word, colour, line in zip(words, cycle(COLOURS), cycle(LINES), strict=False)
     ]
 

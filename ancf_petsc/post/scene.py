@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 import pyvista
+import vtkmodules.vtkRenderingFreeType  # noqa: F401  vtkTextRenderer has an instance from then on
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonCore import vtkLogger
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
+from vtkmodules.vtkRenderingCore import vtkTextRenderer
 
 from ancf_petsc.errors import EnvironmentProblem
 from ancf_petsc.post.panels import GREY
@@ -31,6 +34,8 @@ def make_plotter(*, off_screen: bool, smooth: bool = True) -> pyvista.Plotter:
     if not off_screen and not has_display():
         raise EnvironmentProblem("there is no display to open a window on; use --screenshot FILE")
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # a missing X server is no news off screen
+    renderer = vtkTextRenderer.GetInstance()
+    renderer.SetDefaultBackend(renderer.FreeType)  # else two dollars make a formula, and a bar columns
     plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(SIZE))
     plotter.set_background("white")
     if smooth:
@@ -54,8 +59,22 @@ def surface(grid: pyvista.UnstructuredGrid) -> pyvista.PolyData:
     return pyvista.wrap(skin.GetOutput())
 
 
-def matt(cells: int) -> dict[str, Any]:
-    """How add_mesh draws a body: colours little changed by light, thin edges."""
+def outline(skin: pyvista.PolyData) -> tuple[pyvista.PolyData, dict[str, Any]]:
+    """What shows a body without hiding another, and how add_mesh draws it: its sharp edges; of a body without
+    any, such as a ball, all of it, hardly there; of beams their lines.
+    """
+    if skin.GetNumberOfPolys() == 0:
+        return skin, {"line_width": 1.2, "opacity": 0.8}
+    edges = skin.extract_feature_edges(25)
+    if edges.n_points:
+        return edges, {"line_width": 1.2, "opacity": 0.8}
+    return skin, {"opacity": 0.15, "lighting": False}
+
+
+def matt(cells: int, *, lines: bool = False) -> dict[str, Any]:
+    """How add_mesh draws a body: colours little changed by light, thin edges; beams as thick lines."""
+    if lines:
+        return {"line_width": 9, "render_lines_as_tubes": True, "ambient": 0.5, "reset_camera": False}
     return {
         "ambient": 0.42,
         "diffuse": 0.66,
@@ -93,6 +112,11 @@ def frame(plotter: pyvista.Plotter, positions: Iterable[NDArray[np.float64]], *,
     camera.clipping_range = (0.1 * half, 8 * (half + depth))
 
 
+def one_line(text: str) -> str:
+    """A text of the user's for VTK as it was typed: dollars make no formula, line breaks are blanks."""
+    return re.sub(r"\s*\n\s*", " ", text).replace("$", r"\$")
+
+
 def write_texts(plotter: pyvista.Plotter, title: str, line: str, note: str) -> None:
     """Title and a line in the upper left corner, the note at the bottom; each replaces the one before."""
     tall = plotter.window_size[1]
@@ -103,4 +127,6 @@ def write_texts(plotter: pyvista.Plotter, title: str, line: str, note: str) -> N
     ):
         if text:
             place = (26, height)
-            plotter.add_text(text, position=place, font_size=size, color=colour, name=name, render=False)
+            plotter.add_text(
+                one_line(text), position=place, font_size=size, color=colour, name=name, render=False
+            )

@@ -62,3 +62,11 @@ def read_units(label: str) -> Units:
 def with_unit(name: str, unit: str) -> str:
     """A label for an axis."""
     return f"{name} [{unit}]" if unit else name
+
+
+def as_typed(text: str) -> str:
+    """A text of the user's for matplotlib, which would take dollars for formulas and leave out of a legend what
+    begins with an underscore.
+    """
+    escaped = text.replace("$", r"\$")
+    return f" {escaped}" if escaped.startswith("_") else escaped

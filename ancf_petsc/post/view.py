@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ancf_petsc.errors import CaseError, did_you_mean
 from ancf_petsc.post.panels import GREY
-from ancf_petsc.post.scene import DARK, frame, make_plotter, matt, surface, write_texts
+from ancf_petsc.post.scene import DARK, frame, make_plotter, matt, outline, surface, write_texts
 from ancf_petsc.post.units import Units, read_units, with_unit
 from ancf_petsc.results.reader import Results
 
@@ -78,6 +78,8 @@ def label(results: Results, look: Look) -> str:
     if not component and results.field(look.field, 0).ndim > 1:
         component = _components(results.field(look.field, 0))[0]
     words = WORDS.get(look.field, look.field.replace("_", " "))
+    if results.holds_modes:  # of any size
+        words, known = f"{words}, scaled", {}
     if component and component != "magnitude":
         words = f"{words}, {PRINCIPAL.get(component, component)}"
     return with_unit(words, known.get(look.field, ""))
@@ -97,8 +99,8 @@ class Scene:
         self.colours = "RdBu_r" if self.limits[0] < 0 < self.limits[1] else "viridis"
         self.plotter = make_plotter(off_screen=off_screen, smooth=smooth)
         if look.undeformed:
-            outline = surface(results.mesh(0, scale=0.0, fields=())).extract_feature_edges(25)
-            self.plotter.add_mesh(outline, color=GREY, line_width=1.2, opacity=0.8)
+            shape, paint = outline(surface(results.mesh(0, scale=0.0, fields=())))
+            self.plotter.add_mesh(shape, color=GREY, **paint)
         frame(self.plotter, self._positions(steps), right=0.12)
 
     def _positions(self, steps: range) -> Iterator[NDArray[np.float64]]:
@@ -112,15 +114,16 @@ class Scene:
         body = self.results.mesh(step, scale=self.look.scale, fields=())
         data = body.point_data if self.look.field in self.results.node_fields else body.cell_data
         data[self.title] = scalars(self.results, self.look, step)
+        skin = surface(body)
         actor = self.plotter.add_mesh(
-            surface(body),
+            skin,
             scalars=self.title,
             cmap=self.colours,
             clim=self.limits,
             show_scalar_bar=False,
             name="body",
             render=False,
-            **matt(body.n_cells),
+            **matt(body.n_cells, lines=skin.GetNumberOfPolys() == 0),
         )
         if not self.plotter.scalar_bars:
             self._add_bar(actor)
@@ -171,8 +174,17 @@ def _limits(values: list[NDArray[np.float64]]) -> tuple[tuple[float, float], str
 
 
 def describe(results: Results, look: Look, step: int) -> str:
-    """Time, stroke where the case has one, and the scale of displacements where it is not 1."""
+    """Time, stroke where the case has one, and the scale of displacements where it is not 1; of a mode its
+    number and frequency.
+    """
     units: Units = read_units(results.units)
+    if results.holds_modes:
+        growth = float(results.extras[step].get("growth_rate", 0.0))
+        if growth:
+            return f"mode {results.times[step]:g}   unstable, grows by exp({growth:.4g} t)"
+        unit = {"s": "Hz", "": ""}.get(units.time, f"1/{units.time}")
+        frequency = f"{float(results.extras[step]['frequency']):.4g} {unit}".rstrip()
+        return f"mode {results.times[step]:g}   frequency {frequency}"
     curve = results.curve
     time = results.times[step]
     parts = [f"time {time:.4g} {units.time}".rstrip() if "time" in curve else f"pseudo-time {time:.4g}"]
