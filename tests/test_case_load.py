@@ -149,7 +149,11 @@ def test_set_changes_one_value(folder, setting, read, value):
         ("title.a=1", "title", "is no table"),
         ("material.poisson=0.5", "material.poisson", "found 0.5"),
         ("constraint.top.fix=[", "constraint.top.fix", "a TOML value"),
-        ("material.young=", "material.young", "a TOML value"),
+        ("material.yuong=", "material.yuong", "did you mean 'young'"),
+        ("constraint.tpo=", "constraint.tpo", "did you mean 'top'"),
+        ("title.a=", "title.a", "nothing to remove"),
+        ("material.density=", "material.density", "nothing to remove: the case has no such key"),
+        ("material.young=", "material.young", "missing"),
     ],
 )
 def test_set_refuses(folder, setting, key, words):
@@ -157,6 +161,36 @@ def test_set_refuses(folder, setting, key, words):
     assert error.key == key
     assert words in str(error)
     assert "--set" in str(error)
+
+
+def test_set_without_a_value_removes(folder):
+    """Keys, tables and entries of arrays: so one integrator replaces another that has other keys."""
+    spec = load_case(
+        folder, ["statics.steps=7", "constraint.bottom.fix=", "constraint.bottom.move={z=0}"]
+    ).spec
+    assert spec.constraint[0].fix == ()
+    spec = load_case(folder, ["constraint.top="]).spec
+    assert [one.group for one in spec.constraint] == ["bottom"]
+    motion = ["statics=", "material.density=1", "dynamics={duration=1, integrator='bdf', step=0.1, order=2}"]
+    spec = load_case(
+        folder, [*motion, "dynamics.integrator=runge_kutta_5dp", "dynamics.step=", "dynamics.order="]
+    ).spec
+    assert spec.statics is None
+    assert (spec.dynamics.integrator, spec.dynamics.step) == ("runge_kutta_5dp", None)
+    assert load_case(folder, ["note=''", "note="]).spec.note == ""
+
+
+def test_nul_characters_are_refused_wherever_they_stand(folder):
+    for change in (
+        'title="a\\u0000b"',
+        'mesh.file="a\\u0000.msh"',
+        'groups={ "a\\u0000" = { plane = "z", at = 0 } }',
+    ):
+        error = refusal(folder, [change])
+        assert "a NUL character" in str(error)
+        assert error.key.startswith(change[:4])
+    with pytest.raises(CaseError, match="a NUL character in a path"):
+        load_case("a\0b")
 
 
 @pytest.mark.parametrize("setting", ["material.law", "=3", "", ".law=svk", "material.=svk"])

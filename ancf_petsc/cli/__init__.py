@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
@@ -31,19 +33,22 @@ VERBS = {
 }
 ABOUT = "Large-deformation solids in absolute nodal coordinates, in parallel, on PETSc."
 EPILOG = """\
-exit codes: 0 done; 2 wrong input; 3 no equilibrium further on; 4 wrong environment; 130 interrupted
+exit codes: 0 done; 2 wrong input; 3 no equilibrium further on; 4 wrong environment, full disk; 130 interrupted
 in parallel: mpiexec -n 4 ancf run CASE; PETSc options follow --, as in: ancf run CASE -- -ksp_type cg
 ANCF_TRACEBACK=1 shows where an error comes from; ancf VERB --help has the options of a verb"""
 RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
 SIZE = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
 BROKEN_PIPE = 141
+NO_SIGNALS = "-no_signal_handler"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
+    _keep_petsc_from_signals()
     try:
-        code = _command(words)
+        with _without_warnings_of_arithmetic():
+            code = _command(words)
         sys.stdout.flush()
     except SystemExit as leave:
         return leave.code if isinstance(leave.code, int) else int(leave.code is not None)
@@ -61,6 +66,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         _abort_others(BROKEN_PIPE)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
+    except OSError as error:
+        problem = EnvironmentProblem(f"the system refuses: {error}")
+        if rank_count() > 1:  # of this rank alone, for all one knows
+            print(f"error: rank {rank()}: {problem}", file=sys.stderr, flush=True)
+            _abort_others(problem.exit_code)
+        return _tell(problem)
     except Exception:
         if rank_count() == 1:
             raise
@@ -68,6 +79,23 @@ def main(argv: Sequence[str] | None = None) -> int:
         _abort_others(1)
         return 1
     return code
+
+
+def _keep_petsc_from_signals() -> None:
+    """PETSc, when it starts, would end the process on SIGPIPE: a reader that leaves (`| head`) must not end a run."""
+    given = os.environ.get("PETSC_OPTIONS", "")
+    if NO_SIGNALS not in given:
+        os.environ["PETSC_OPTIONS"] = f"{given} {NO_SIGNALS}".strip()
+
+
+@contextmanager
+def _without_warnings_of_arithmetic() -> Iterator[None]:
+    """Keep numpy's lines on overflow and the like from the terminal: numbers that are not finite are errors of ours."""
+    with warnings.catch_warnings():
+        if os.environ.get("ANCF_TRACEBACK", "") in ("", "0"):
+            words = "(overflow|underflow|invalid value|divide by zero) encountered"
+            warnings.filterwarnings("ignore", words, RuntimeWarning)
+        yield
 
 
 def rank() -> int:
@@ -97,6 +125,8 @@ class Parser(argparse.ArgumentParser):
 
 
 def _command(words: list[str]) -> int:
+    if broken := next((word for word in words if "\0" in word), None):
+        raise CaseError("a NUL character", file="ancf", got=broken, expected="words and paths without one")
     top = _top_parser()
     chosen = top.parse_args(words[:1])
     if chosen.verb is None:
@@ -157,7 +187,7 @@ class _Version(argparse.Action):
 
 def _unknown_verb(word: str) -> CaseError:
     case = word.endswith(".toml") or (Path(word) / "case.toml").is_file()
-    cure = f"did you mean: ancf run {word}" if case else did_you_mean(word, tuple(VERBS))
+    cure = f"did you mean: ancf run {shlex.quote(word)}" if case else did_you_mean(word, tuple(VERBS))
     return CaseError("unknown verb", file="ancf", got=word, cure=cure)
 
 

@@ -43,13 +43,14 @@ def execute(arguments: argparse.Namespace) -> int:
 
 def _print_mesh(plan: Plan) -> None:
     from ancf_petsc.cli.console import show_facts, show_table
-    from ancf_petsc.mesh.check import statistics
+    from ancf_petsc.mesh.check import MEASURES, statistics
 
     mesh = plan.mesh
     found = statistics(mesh)
     worst = f"worst {found.worst_quality:.3f} in element {found.worst_cell}"
     low, high = found.box
     unused = f", {found.unused_nodes} of them in no element" if found.unused_nodes else ""
+    quality = ("quality (mean ratio)", f"{worst}, mean {found.mean_quality:.3f}")
     show_facts(
         [
             ("mesh", mesh.source),
@@ -57,22 +58,24 @@ def _print_mesh(plan: Plan) -> None:
             ("elements", f"{found.cells} of {plan.element.code}"),
             ("pieces", found.pieces),
             ("box", " x ".join(f"[{a:.6g}, {b:.6g}]" for a, b in zip(low, high, strict=True))),
-            ("volume", found.volume),
+            (found.measure, found.volume),
             ("edges", f"{found.shortest_edge:.4g} to {found.longest_edge:.4g}"),
-            ("quality (mean ratio)", f"{worst}, mean {found.mean_quality:.3f}"),
+            *([quality] if found.dimension > 1 else []),
             *(("note", note) for note in mesh.notes),
         ]
     )
+    dimensions = range(1, found.dimension + 1)
     rows = [
         [
             name,
             group.nodes,
-            *(group.parts.get(d) for d in (1, 2, 3)),
-            *(group.measures.get(d) for d in (1, 2, 3)),
+            *(group.parts.get(d) for d in dimensions),
+            *(group.measures.get(d) for d in dimensions),
         ]
         for name, group in found.groups.items()
     ]
-    show_table(["group", "nodes", "lines", "faces", "elements", "length", "area", "volume"], rows)
+    parts = [*("lines", "faces")[: found.dimension - 1], "elements"]
+    show_table(["group", "nodes", *parts, *(MEASURES[d] for d in dimensions)], rows)
 
 
 def _print_case(case: Case, plan: Plan) -> None:

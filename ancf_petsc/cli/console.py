@@ -31,7 +31,8 @@ def show_table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, titl
     table = Table(box=SIMPLE_HEAD, title=title or None, title_justify="left", pad_edge=False)
     held = [list(row) for row in rows]
     for index, name in enumerate(columns):
-        numbers = bool(held) and all(is_number(row[index]) for row in held)
+        cells = [row[index] for row in held if row[index] is not None]
+        numbers = bool(cells) and all(map(is_number, cells))
         table.add_column(Text(name), justify="right" if numbers else "left", overflow="fold")
     for row in held:
         table.add_row(*(Text(written(cell)) for cell in row))

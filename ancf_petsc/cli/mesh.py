@@ -82,19 +82,24 @@ def _print_mesh(path: Path, kinds: tuple[str, ...]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from ancf_petsc.mesh.check import statistics
+    from ancf_petsc.mesh.check import MEASURES, statistics
     from ancf_petsc.mesh.read import read_mesh
 
     found = statistics(read_mesh(path, kinds))
     console = Console(highlight=False)
-    console.print(f"{found.nodes} nodes, {found.cells} {found.kind} cells, volume {found.volume:.6g}")
+    console.print(
+        f"{found.nodes} nodes, {found.cells} {found.kind} cells, {found.measure} {found.volume:.6g}"
+    )
     worst = f"worst {found.worst_quality:.3f} in cell {found.worst_cell}"
-    console.print(f"quality (mean ratio): {worst}, mean {found.mean_quality:.3f}")
+    if found.dimension > 1:
+        console.print(f"quality (mean ratio): {worst}, mean {found.mean_quality:.3f}")
     console.print(f"edges {found.shortest_edge:.4g} to {found.longest_edge:.4g}")
-    table = Table("group", "nodes", "lines", "faces", "cells", "size", box=None)
+    parts = [*("lines", "faces")[: found.dimension - 1], "cells"]
+    dimensions = range(1, found.dimension + 1)
+    table = Table("group", "nodes", *parts, *(MEASURES[d] for d in dimensions), box=None)
     for name, group in found.groups.items():
-        counts = [str(group.parts.get(dimension, "")) for dimension in (1, 2, 3)]
-        sizes = ", ".join(f"{size:.6g}" for size in group.measures.values())
-        table.add_row(name, str(group.nodes), *counts, sizes)
+        counts = [str(group.parts.get(d, "")) for d in dimensions]
+        sizes = [f"{group.measures[d]:.6g}" if d in group.measures else "" for d in dimensions]
+        table.add_row(name, str(group.nodes), *counts, *sizes)
     console.print(table)
     console.print(f"wrote {path}", soft_wrap=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -29,9 +30,9 @@ def execute(arguments: argparse.Namespace) -> int:
         from mpi4py import MPI
 
     from ancf_petsc import log
-    from ancf_petsc.analysis.modes import find_modes
     from ancf_petsc.cli.console import show_table
     from ancf_petsc.input.load import load_case
+    from ancf_petsc.launcher import start_petsc
     from ancf_petsc.parallel.exchange import on_root
 
     if arguments.count < 1:
@@ -40,6 +41,9 @@ def execute(arguments: argparse.Namespace) -> int:
     log.configure(rank=comm.rank)
     read = on_root(comm, lambda: load_case(arguments.case, changes(arguments), arguments.petsc_options))
     case = comm.bcast(read)
+    start_petsc(case.spec.petsc)
+    from ancf_petsc.analysis.modes import find_modes
+
     folder = arguments.out or Path("results") / f"{case.name}_modes"
     rows = find_modes(
         case, folder, arguments.count, loaded=arguments.loaded, force=arguments.force, comm=comm
@@ -48,7 +52,7 @@ def execute(arguments: argparse.Namespace) -> int:
         title = "modes of the body under its loads" if arguments.loaded else "modes of the unloaded body"
         columns = ("mode", "frequency", "period", "omega", "alpha = 4 pi / T")
         show_table(columns, [_shown(row) for row in rows], title=title)
-        print(f"shapes in {folder}; ancf view {folder} shows them one by one")
+        print(f"shapes in {folder}; ancf view {shlex.quote(str(folder))} shows them one by one")
     return 0
 
 

@@ -166,13 +166,13 @@ def execute(arguments: argparse.Namespace) -> int:
 
     if rank() == 0:
         file = write_case(arguments.name, arguments.kind)
-        print(f"wrote {file} and its mesh; next: ancf run {arguments.name}")
+        print(f"wrote {file} and its mesh; next: ancf run {quote(str(arguments.name))}")
     return 0
 
 
 def write_case(folder: Path, kind: str = DEFAULT_KIND) -> Path:
     """Make `folder` with case.toml and a mesh; the case file. Raises CaseError where there is something."""
-    from ancf_petsc.errors import CaseError, did_you_mean
+    from ancf_petsc.errors import CaseError, did_you_mean, writing
     from ancf_petsc.input.load import CASE_FILE
     from ancf_petsc.mesh.generate import make_mesh
 
@@ -196,7 +196,8 @@ def write_case(folder: Path, kind: str = DEFAULT_KIND) -> Path:
     mesh = f"{chosen.mesh}.msh"
     try:
         make_mesh(chosen.mesh, folder / mesh, divisions=chosen.divisions)
-        (folder / CASE_FILE).write_text(case_text(folder, kind), encoding="utf-8")
+        with writing(folder / CASE_FILE):
+            (folder / CASE_FILE).write_text(case_text(folder, kind), encoding="utf-8")
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise

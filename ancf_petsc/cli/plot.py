@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ancf_petsc.errors import CaseError, EnvironmentProblem
+from ancf_petsc.errors import CaseError, EnvironmentProblem, writing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -70,13 +70,9 @@ def execute(arguments: argparse.Namespace) -> int:
     if not figures:
         raise CaseError("nothing to draw: the tables are empty", file=arguments.runs[0])
     out = arguments.out or (arguments.runs[0] if len(runs) == 1 else Path("plots"))
-    try:
+    with writing(out, "--out"):
         for path in save(figures, out, arguments.format):
             print(path)
-    except OSError as error:
-        raise CaseError(
-            f"cannot be written: {error.strerror}", file=error.filename or out, key="--out"
-        ) from error
     if arguments.show:
         plt.show()
     return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import time
 from pathlib import Path
 
@@ -22,24 +23,45 @@ def add_case_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         nargs="+",
         default=[],
-        help="change keys of the case: material.law=neo_hooke constraint.top.fix=[]",
+        help="change keys of the case: material.law=neo_hooke constraint.top.fix=[]; KEY= removes one",
     )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
     parser.add_argument("--out", type=Path, metavar="DIR", help="where the results go (default results/NAME)")
-    parser.add_argument("--force", action="store_true", help="overwrite a folder that holds something else")
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="overwrite a folder that holds anything else than this case's run",
+    )
+    parser.add_argument(
+        "--again",
+        action="store_true",
+        help="CASE is the folder of a run: repeat it, with all its changes, in its folder or in --out",
+    )
     volume = parser.add_mutually_exclusive_group()
     volume.add_argument(
         "--quiet", action="store_const", dest="verbosity", const=-1, default=0, help="warnings only"
     )
-    volume.add_argument("--verbose", action="store_const", dest="verbosity", const=1, help="details too")
+    volume.add_argument(
+        "--verbose",
+        action="store_const",
+        dest="verbosity",
+        const=1,
+        help="details too: what the run records of itself, every iteration's residual, seconds by part",
+    )
 
 
 def changes(arguments: argparse.Namespace) -> list[str]:
     """All KEY=VALUE of a command line."""
     return [change for group in arguments.changes for change in group]
+
+
+def results_line(folder: Path) -> str:
+    """The last line of a run: what to do with its folder, quoted for a shell."""
+    name = shlex.quote(str(folder))
+    return f"results in {folder}; ancf plot {name} draws the curves, ancf view {name} shows the body"
 
 
 def execute(arguments: argparse.Namespace) -> int:
@@ -48,19 +70,23 @@ def execute(arguments: argparse.Namespace) -> int:
         from mpi4py import MPI
 
     from ancf_petsc import log
-    from ancf_petsc.analysis.run import run_case
+    from ancf_petsc.analysis.provenance import case_of_run
     from ancf_petsc.input.load import load_case
+    from ancf_petsc.launcher import start_petsc
     from ancf_petsc.parallel.exchange import on_root
 
     comm = MPI.COMM_WORLD
     log.configure(rank=comm.rank, verbosity=arguments.verbosity)
-    imports = time.perf_counter() - begun
-    read = on_root(comm, lambda: load_case(arguments.case, changes(arguments), arguments.petsc_options))
+    load = case_of_run if arguments.again else load_case
+    read = on_root(comm, lambda: load(arguments.case, changes(arguments), arguments.petsc_options))
     case = comm.bcast(read)
+    start_petsc(case.spec.petsc)
+    from ancf_petsc.analysis.run import run_case
+
+    out = arguments.out or (arguments.case if arguments.again else None)
+    imports = time.perf_counter() - begun
     with log.progress(1.0, "of the path" if case.spec.statics else "of the motion") as bar:
-        folder = run_case(
-            case, arguments.out, comm=comm, force=arguments.force, imports=imports, watch=bar.advance_to
-        )
+        folder = run_case(case, out, comm=comm, force=arguments.force, imports=imports, watch=bar.advance_to)
     if comm.rank == 0 and arguments.verbosity >= 0:
-        print(f"results in {folder}; ancf plot {folder} draws the curves, ancf view {folder} shows the body")
+        print(results_line(folder))
     return 0

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ancf_petsc.cli.run import add_case_arguments, changes
-from ancf_petsc.errors import CaseError
+from ancf_petsc.errors import CaseError, writing
 
 if TYPE_CHECKING:
     from ancf_petsc.mesh.mesh import Mesh
@@ -75,10 +75,12 @@ def _show_run(arguments: argparse.Namespace) -> None:
     look = view.Look(arguments.field, arguments.component, arguments.scale, arguments.undeformed)
     step = _step(results, arguments)
     if arguments.screenshot:
-        view.screenshot(results, look, step, arguments.screenshot)
+        with writing(arguments.screenshot, "--screenshot"):
+            view.screenshot(results, look, step, arguments.screenshot)
         print(arguments.screenshot)
     if arguments.movie:
-        view.movie(results, look, arguments.movie)
+        with writing(arguments.movie, "--movie"):
+            view.movie(results, look, arguments.movie)
         print(arguments.movie)
     if not (arguments.screenshot or arguments.movie):
         view.explore(results, look, step)
@@ -104,7 +106,8 @@ def _show_case(arguments: argparse.Namespace) -> None:
     mesh.groups |= choose_groups(mesh, chosen, file=case.file)
     shown = (mesh, _supports(case, mesh), case.spec.title, case.spec.note)
     if arguments.screenshot:
-        case_view.screenshot(*shown, arguments.screenshot)
+        with writing(arguments.screenshot, "--screenshot"):
+            case_view.screenshot(*shown, arguments.screenshot)
         print(arguments.screenshot)
     else:
         case_view.explore(*shown)

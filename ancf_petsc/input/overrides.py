@@ -1,4 +1,6 @@
-"""Changes to a case before it is checked: `--set constraint.top.fix=[]`, and PETSc options after `--`."""
+"""Changes to a case before it is checked: `--set constraint.top.fix=[]` (`--set dynamics.step=` removes the key), and
+PETSc options after `--`.
+"""
 
 from __future__ import annotations
 
@@ -18,14 +20,18 @@ TEXTS = {("mesh", "element"), ("mesh", "file"), ("title",), ("units",)}
 
 
 def apply_settings(data: dict[str, Any], settings: Iterable[str]) -> None:
-    """Apply `path=value` texts to the tables of a case, in order."""
+    """Apply `path=value` texts to the tables of a case, in order; `path=` alone takes the key away."""
     for setting in settings:
         way, rest = split_path(setting)
         if not rest.startswith("="):
             raise CaseError(
                 file=SET, got=setting, expected="key=value", cure="such as --set material.law=neo_hooke"
             )
-        set_value(data, way, _value(way, rest[1:].strip()))
+        text = rest[1:].strip()
+        if text:
+            set_value(data, way, _value(way, text))
+        else:
+            remove_value(data, way)
 
 
 def split_path(text: str) -> tuple[tuple[str, ...], str]:
@@ -89,6 +95,29 @@ def set_value(data: dict[str, Any], way: Sequence[str], value: Any) -> None:
         else:
             raise _nowhere(way[:depth], f"is no table: it holds {place!r}")
     _assign(place, way, value)
+
+
+def remove_value(data: dict[str, Any], way: Sequence[str]) -> None:
+    """Remove the key, table or entry at the end of `way`. Raises CaseError where there is none."""
+    place: Any = data
+    for depth in range(len(way)):
+        here = way[: depth + 1]
+        if isinstance(place, list):
+            key: Any = _index(place, here)
+        elif isinstance(place, dict) and way[depth] in place:
+            key = way[depth]
+        else:
+            there = tuple(place) if isinstance(place, dict) else ()
+            raise CaseError(
+                "nothing to remove: the case has no such key",
+                file=SET,
+                key=".".join(here),
+                expected="a key of the case; key= without a value removes it",
+                cure=did_you_mean(way[depth], there),
+            )
+        if depth < len(way) - 1:
+            place = place[key]
+    del place[key]
 
 
 def _assign(place: Any, way: Sequence[str], value: Any) -> None:

@@ -12,6 +12,8 @@ from ancf_petsc.mesh.groups import measure
 from ancf_petsc.mesh.kinds import KINDS, edge_lengths, part_sizes, qualities
 from ancf_petsc.mesh.mesh import Floats, Integers, Mesh
 
+MEASURES = {1: "length", 2: "area", 3: "volume"}  # by dimension
+
 
 @dataclass(frozen=True)
 class GroupStatistics:
@@ -29,14 +31,16 @@ class GroupStatistics:
 class MeshStatistics:
     """Sizes of a mesh. Quality is the mean ratio: 1 for a regular cell, 0 for a flat one.
 
-    box: (2, 3) lowest and highest coordinates of the nodes in use. volume: area or length of a plane body
-    or of lines. worst_cell: number in the file. pieces: how many unconnected bodies.
+    dimension: of the cells. volume: of a plane body its area, of lines their length; `measure` names it.
+    box: (2, 3) lowest and highest coordinates of the nodes in use. worst_cell: number in the file. pieces: how
+    many unconnected bodies.
     """
 
     nodes: int
     unused_nodes: int
     cells: int
     kind: str
+    dimension: int
     volume: float
     box: Floats
     worst_quality: float
@@ -46,6 +50,11 @@ class MeshStatistics:
     longest_edge: float
     pieces: int
     groups: dict[str, GroupStatistics]
+
+    @property
+    def measure(self) -> str:
+        """What `volume` is."""
+        return MEASURES[self.dimension]
 
 
 def statistics(mesh: Mesh) -> MeshStatistics:
@@ -61,6 +70,7 @@ def statistics(mesh: Mesh) -> MeshStatistics:
         unused_nodes=int(np.count_nonzero(~mesh.used)),
         cells=len(mesh.cells),
         kind=mesh.kind,
+        dimension=kind.dimension,
         volume=float(part_sizes(mesh.points, corners, kind).sum()),
         box=np.stack([body.min(axis=0), body.max(axis=0)]),
         worst_quality=float(quality[worst]),

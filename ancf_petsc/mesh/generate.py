@@ -5,13 +5,15 @@ A brick is six tetrahedra that share its diagonal from the lowest to the highest
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ancf_petsc.errors import CaseError, did_you_mean
+from ancf_petsc.errors import CaseError, did_you_mean, writing
 from ancf_petsc.mesh.bodies import BODIES, Plane, Primitive
 from ancf_petsc.mesh.gmsh_session import gmsh_session
 from ancf_petsc.mesh.kinds import KINDS, KUHN, part_kind
@@ -247,7 +249,19 @@ def _write(
             mesh.addElementsByType(tag, kind.gmsh, [], (parts + 1).ravel())
         if order == 2:
             mesh.setOrder(2)
+        part = path.with_name(
+            f"{path.stem}.part{path.suffix}"
+        )  # a mesh that is there already stays until this is whole
         try:
-            gmsh.write(str(path))
+            gmsh.write(str(part))
         except Exception as error:
             raise CaseError(f"the mesh cannot be written ({error})", key="--out", got=str(path)) from None
+    with writing(path, "--out"):
+        try:
+            whole = part.read_bytes().rstrip().endswith(b"$EndElements")
+            if path.suffix == ".msh" and not whole:  # Gmsh says nothing of a full disk
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            part.replace(path)
+        except OSError:
+            part.unlink(missing_ok=True)
+            raise

@@ -70,7 +70,8 @@ class TimeIntegration:
         start, carried = integrator.time, integrator.a
         try:
             step = integrator.step_to(goal)
-            if not isfinite(integrator.x.norm() + integrator.v.norm(PETSc.NormType.INFINITY) ** 2):
+            fastest = integrator.v.norm(PETSc.NormType.INFINITY)
+            if not isfinite(integrator.x.norm() + fastest * fastest):
                 reached, integrator.time = integrator.time, start
                 raise integrator.failed(reached, "numbers are not finite any more")
         except MotionStopped:
