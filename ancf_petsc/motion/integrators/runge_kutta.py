@@ -9,8 +9,8 @@ from petsc4py import PETSc
 
 from ancf_petsc.kernel.adaptive import NOT_FINITE, TOO_SHORT
 from ancf_petsc.kernel.explicit import EXPLICIT
-from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.compiled import CompiledMotion
+from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.integrators.base import Settings, Step
 from ancf_petsc.motion.integrators.first_order import SPEED_CHANGE, FirstOrder
 from ancf_petsc.solve.petsc import begins_a_given_option, default_options
