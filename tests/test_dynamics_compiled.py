@@ -12,7 +12,7 @@ from ancf_petsc.analysis.build import build
 from ancf_petsc.analysis.motion import MotionAnalysis
 from ancf_petsc.analysis.run import run_case
 from ancf_petsc.errors import MotionStopped
-from ancf_petsc.motion.fused_newton import FusedNewton
+from ancf_petsc.motion.compiled_newton import CompiledNewton
 from ancf_petsc.motion.integrators import Integrator
 from ancf_petsc.results.tables import read_table
 from ancf_petsc.solve.petsc import petsc_options
@@ -28,7 +28,7 @@ def both_ways(tmp_path, monkeypatch, data):
     curves = []
     for way in ("compiled", "petsc"):
         if way == "petsc":
-            monkeypatch.setattr(Integrator, "fused", None)
+            monkeypatch.setattr(Integrator, "compiled", None)
         run_case(case_from_dict(data, PROJECT), tmp_path / way)
         curves.append(read_table(tmp_path / way / "curve.csv"))
     return curves
@@ -63,7 +63,7 @@ def test_generalised_alpha_takes_the_iterations_of_snes(tables, damping, tmp_pat
 def test_a_step_that_fails_is_left_to_snes(monkeypatch):
     """Which goes on from the step before; here every other leap is said to have failed at its second step."""
     answer = Followed(pendulum(ALPHA)).positions
-    whole, calls = FusedNewton.steps, []
+    whole, calls = CompiledNewton.steps, []
 
     def steps(self, state, times, scheme):
         calls.append(len(times))
@@ -72,7 +72,7 @@ def test_a_step_that_fails_is_left_to_snes(monkeypatch):
         done, newton, good = whole(self, state, times[:1], scheme)
         return done, newton, False
 
-    monkeypatch.setattr(FusedNewton, "steps", steps)
+    monkeypatch.setattr(CompiledNewton, "steps", steps)
     followed = Followed(pendulum(ALPHA))
     assert sum(step.count for step in followed.steps) == 100
     assert followed.steps[0].time == pytest.approx(0.05)

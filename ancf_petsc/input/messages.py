@@ -22,13 +22,13 @@ LONGEST = 80
 ABSENT = object()
 FORMAT_PAGE = "docs/case-format.md has examples"
 
-Way = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 
 
 class Place(NamedTuple):
-    """Where in the case a problem is: the way to it, the value there, the key's field and its table."""
+    """Where in the case a problem is: the path to it, the value there, the key's field and its table."""
 
-    way: Way
+    path: KeyPath
     value: Any
     field: FieldInfo | None
     table: type[BaseModel]
@@ -46,8 +46,8 @@ def case_error(
     for detail in sorted(
         error.errors(include_url=False), key=lambda detail: detail["type"] != "extra_forbidden"
     ):
-        told = _translate(detail, data, source, file)
-        found.setdefault(str(told.key), told)
+        problem = _translate(detail, data, source, file)
+        found.setdefault(str(problem.key), problem)
         hidden += detail.get("ctx", {}).get("more", 0)
     first, others = next(iter(found.values())), len(found) - 1 + hidden
     if others:
@@ -67,7 +67,7 @@ def _translate(
 ) -> CaseError:
     kind, context = detail["type"], detail.get("ctx", {})
     place = _below(_place(detail["loc"], data), context.get("at", ()))
-    way, got = place.way, place.value
+    path, got = place.path, place.value
     what, (expected, _, cure) = "", ((place.field and place.field.description) or "").partition("; ")
     if kind == "problem":
         what = context["what"]
@@ -75,17 +75,17 @@ def _translate(
         expected, cure = context["expected"] or expected, context["cure"] or cure
     elif kind == "extra_forbidden":
         what, got, expected = "unknown key", None, ""
-        cure = did_you_mean(str(way[-1]), tuple(place.table.model_fields))
+        cure = did_you_mean(str(path[-1]), tuple(place.table.model_fields))
     elif "[key]" in detail["loc"]:
         what, got, expected, cure = "unknown key", None, f"one of {', '.join(AXES)}", cure
     elif kind.startswith("union_tag"):
-        way, got = (*way, "type"), got.get("type", ABSENT)
+        path, got = (*path, "type"), got.get("type", ABSENT)
         expected, cure = " or ".join(f'"{name}"' for name in LOADS), _nearest(got, LOADS)
     elif options := _options_of(place.field):
         cure = _nearest(got, options)
     if got is ABSENT:
         what, got = what or "missing", None
-    key = written(way, source)
+    key = written(path, source)
     return CaseError(what, file=file, key=key, got=shown(got), expected=expected, cure=cure or FORMAT_PAGE)
 
 
@@ -94,11 +94,11 @@ def _nearest(got: Any, known: tuple[str, ...]) -> str:
 
 
 def _place(loc: Sequence[str | int], data: dict[str, Any]) -> Place:
-    """Follow pydantic's location through the data, as far as a key whose value is told as a whole.
+    """Follow pydantic's location through the data, as far as a key whose value is named as a whole.
 
     Names of union branches, which pydantic mixes in, are left out.
     """
-    way: Way = ()
+    path: KeyPath = ()
     value: Any = data
     annotation: Any = CaseSpec
     field: FieldInfo | None = None
@@ -114,17 +114,17 @@ def _place(loc: Sequence[str | int], data: dict[str, Any]) -> Place:
             break
         annotation, key_field, owner = inner
         field, table = key_field or field, owner or table
-        way, value = (*way, item), value[item] if inside else ABSENT
-    return Place(way, value, field, table)
+        path, value = (*path, item), value[item] if inside else ABSENT
+    return Place(path, value, field, table)
 
 
-def _below(place: Place, way: Way) -> Place:
+def _below(place: Place, path: KeyPath) -> Place:
     """The place that a check names itself, as far below the table it checked."""
     value = place.value
-    for item in way:
+    for item in path:
         inside = isinstance(item, int) or (isinstance(value, dict) and item in value)
         value = value[item] if inside else ABSENT
-    return place._replace(way=(*place.way, *way), value=value)
+    return place._replace(path=(*place.path, *path), value=value)
 
 
 def _step(
@@ -182,13 +182,13 @@ def _lists(value: Any) -> Any:
     return [_lists(inner) for inner in value] if isinstance(value, tuple) else value
 
 
-def written(way: Way, data: Any) -> str:
-    """The way to a key with dots, entries of arrays by their name or group where that is theirs alone.
+def written(path: KeyPath, data: Any) -> str:
+    """The path to a key with dots, entries of arrays by their name or group where that is theirs alone.
 
     It is what --set takes.
     """
     names: list[str] = []
-    for item in way:
+    for item in path:
         if isinstance(item, str):
             names.append(_quoted(item))
             data = data.get(item) if isinstance(data, dict) else None

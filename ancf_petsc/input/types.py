@@ -55,11 +55,11 @@ def problem(
     return PydanticCustomError("problem", "{what}", context)
 
 
-def one_of(known: Callable[[], Collection[str]], what: str) -> AfterValidator:
-    """A string out of what `known` gives when a case is read."""
+def one_of(known: Collection[str] | Callable[[], Collection[str]], what: str) -> AfterValidator:
+    """A string out of `known`, or of what it gives when a case is read."""
 
     def check(word: str) -> str:
-        names = known()
+        names = known() if callable(known) else known
         if word not in names:
             raise problem(got=word, expected=what, cure=did_you_mean(word, tuple(names)))
         return word

@@ -13,8 +13,8 @@ from petsc4py import PETSc
 
 from ancf_petsc.errors import MotionStopped
 from ancf_petsc.input.methods import METHODS
+from ancf_petsc.motion.compiled import CompiledMotion, compiled_motion
 from ancf_petsc.motion.equations import Equations
-from ancf_petsc.motion.fused import FusedMotion, fused_motion
 
 SHORTEST = 1e-13  # of the duration: a step so short does not move the clock reliably
 TINY = 0.9e-9  # of the usual step: increments so small are rounding, and velocities made of them are wrong
@@ -73,9 +73,9 @@ class Integrator(ABC):
         self.ts.setErrorIfStepFails(False)
 
     @cached_property
-    def fused(self) -> FusedMotion | None:
+    def compiled(self) -> CompiledMotion | None:
         """The motion in compiled loops, where the body is simple enough."""
-        return fused_motion(self.equations)
+        return compiled_motion(self.equations)
 
     @property
     def adaptive(self) -> bool:

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from petsc4py import PETSc
 
+from ancf_petsc.motion.compiled import CompiledMotion
 from ancf_petsc.motion.equations import Equations
-from ancf_petsc.motion.fused import FusedMotion
 from ancf_petsc.motion.integrators.base import Integrator, Settings, Step, steps_in
 
 
@@ -30,7 +30,7 @@ class CentralDifference(Integrator):
 
     @property
     def is_compiled(self) -> bool:
-        return self.fused is not None
+        return self.compiled is not None
 
     @property
     def leaps(self) -> bool:
@@ -45,7 +45,7 @@ class CentralDifference(Integrator):
     def advance(self, goal: float) -> Step:
         if not self._begun:
             self.restart()
-        return self._step(goal) if self.fused is None else self._leap(goal, self.fused)
+        return self._step(goal) if self.compiled is None else self._leap(goal, self.compiled)
 
     def restart(self) -> None:
         v = self.v.array_r.reshape(-1, 3)
@@ -55,12 +55,12 @@ class CentralDifference(Integrator):
     def set_solver_up(self) -> None:
         """There is no solver but that of the mass."""
 
-    def _leap(self, goal: float, fused: FusedMotion) -> Step:
+    def _leap(self, goal: float, compiled: CompiledMotion) -> Step:
         parts = steps_in(goal - self.time, self.settings.step)
-        size, count = (goal - self.time) / parts, min(parts, fused.at_once)
+        size, count = (goal - self.time) / parts, min(parts, compiled.at_once)
         x, v = self.x.array.reshape(-1, 3), self.v.array.reshape(-1, 3)
         self.a = self.a.copy()
-        known = fused.march(self.time, size, count, x, v, self.a)
+        known = compiled.march(self.time, size, count, x, v, self.a)
         self.time = goal if count == parts else self.time + size * count
         return Step(self.time, size * count, known=known, count=count)
 

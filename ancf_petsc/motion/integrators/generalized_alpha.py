@@ -15,8 +15,8 @@ from petsc4py import PETSc
 
 from ancf_petsc.kernel.implicit import Scheme
 from ancf_petsc.model.matrix import Matrix
+from ancf_petsc.motion.compiled_newton import CompiledNewton
 from ancf_petsc.motion.equations import Equations
-from ancf_petsc.motion.fused_newton import FusedNewton
 from ancf_petsc.motion.increment import Forces
 from ancf_petsc.motion.integrators.base import Integrator, Settings, Step, steps_in
 from ancf_petsc.motion.integrators.one_step import OneStep
@@ -34,9 +34,9 @@ class GeneralizedAlpha(OneStep):
         self.beta = 0.25 * (1 + self.alpha_m - self.alpha_f) ** 2
         super().__init__(equations, settings, x, v)
         self._still = np.zeros((0, 3))
-        self._newton: FusedNewton | None = None
-        if self.fused is not None and FusedNewton.fits(self.solver):
-            self._newton = FusedNewton(self.fused, equations, self.solver)
+        self._newton: CompiledNewton | None = None
+        if self.compiled is not None and CompiledNewton.fits(self.solver):
+            self._newton = CompiledNewton(self.compiled, equations, self.solver)
         self.restart()
 
     @property
@@ -99,12 +99,12 @@ class GeneralizedAlpha(OneStep):
         v1, self.a = self._ends(d)
         self.v.array[:] = v1.ravel()
 
-    def _leap(self, goal: float, loop: FusedNewton) -> Step:
+    def _leap(self, goal: float, loop: CompiledNewton) -> Step:
         """Equal steps towards the goal: one where loss or work is summed up after each, else many."""
         start, parts = self.time, steps_in(goal - self.time, self.settings.step)
         size = (goal - start) / parts
-        alone = self.equations.damping or not loop.fused.steady
-        count = 1 if alone else min(parts, max(1, loop.fused.at_once // 4))
+        alone = self.equations.damping or not loop.compiled.steady
+        count = 1 if alone else min(parts, max(1, loop.compiled.at_once // 4))
         if abs(size - self._size) > 1e-9 * size:
             loop.aged, self._size = True, size
         self.h, self.a, before = size, self.a.copy(), self.x.array_r.reshape(-1, 3).copy()
@@ -113,7 +113,7 @@ class GeneralizedAlpha(OneStep):
         done, newton, good = loop.steps(state, start + size * (np.arange(count) + self.alpha_f), scheme)
         self.time = goal if done == parts else start + size * done
         if good:
-            known = None if alone else (loop.fused.work(before, state[0]), 0.0)
+            known = None if alone else (loop.compiled.work(before, state[0]), 0.0)
             return Step(self.time, size * done, newton, newton, known=known, count=done)
         self.solver.test.aged = True
         last = super().advance(goal if done + 1 == parts else start + size * (done + 1))

@@ -97,9 +97,9 @@ class OneStep(Integrator):
     def unbalance(self, t: float, d: PETSc.Vec, part: float, carried: NDArray) -> tuple[NDArray, float]:
         """M carried + Q(x + part d) - Q_e(t) (n, 3), and the sum of squares of the three on this rank."""
         eq = self.equations
-        if self.fused is not None:
+        if self.compiled is not None:
             states = (self.x.array_r.reshape(-1, 3), d.array_r.reshape(-1, 3))
-            return self.fused.unbalance(t, *states, part, carried)
+            return self.compiled.unbalance(t, *states, part, carried)
         inertia, loads = eq.mass.times(carried), eq.loads(t)
         internal, _ = eq.assembly.internal_force(self.between(d, part))
         return inertia + internal - loads, self.squared(inertia, internal, loads)

@@ -9,8 +9,8 @@ from petsc4py import PETSc
 
 from ancf_petsc.kernel.adaptive import NOT_FINITE, TOO_SHORT
 from ancf_petsc.kernel.explicit import EXPLICIT
+from ancf_petsc.motion.compiled import CompiledMotion
 from ancf_petsc.motion.equations import Equations
-from ancf_petsc.motion.fused import FusedMotion
 from ancf_petsc.motion.integrators.base import Settings, Step
 from ancf_petsc.motion.integrators.first_order import SPEED_CHANGE, FirstOrder
 from ancf_petsc.solve.petsc import begins_a_given_option, default_options
@@ -34,7 +34,7 @@ class RungeKutta5dp(FirstOrder):
         self.begin(self.longest_stable)
         pair = EXPLICIT[self.table].lower is not None
         free = self.adaptive and pair and not begins_a_given_option("ts_")
-        self._leaping = self.fused if free and self.fused is not None and self.fused.steady else None
+        self._leaping = self.compiled if free and self.compiled is not None and self.compiled.steady else None
 
     @property
     def is_compiled(self) -> bool:
@@ -43,12 +43,12 @@ class RungeKutta5dp(FirstOrder):
     def advance(self, goal: float) -> Step:
         return super().advance(goal) if self._leaping is None else self._leap(goal, self._leaping)
 
-    def _leap(self, goal: float, fused: FusedMotion) -> Step:
+    def _leap(self, goal: float, compiled: CompiledMotion) -> Step:
         tolerance, before = self.settings.tolerance, self.time
         position = tolerance * self.equations.assembly.model.size
         span = (self.time, goal, self.reach)
         control = (self._proposed, self._speed, position, tolerance, SPEED_CHANGE)
-        done = fused.leap(self.y.array, EXPLICIT[self.table], span, control)
+        done = compiled.leap(self.y.array, EXPLICIT[self.table], span, control)
         if done.status == NOT_FINITE:
             raise self.failed(goal, "numbers are not finite any more")
         if done.status == TOO_SHORT:
@@ -65,8 +65,8 @@ class RungeKutta5dp(FirstOrder):
         return self.highest_stable / omega if omega else self.equations.duration
 
     def _rates(self, ts: PETSc.TS, t: float, y: PETSc.Vec, f: PETSc.Vec) -> None:
-        if self.fused is not None:
-            self.fused.rates(t, y.array_r, f.array_w)
+        if self.compiled is not None:
+            self.compiled.rates(t, y.array_r, f.array_w)
             return
         x, v = self.stage(y, t)
         a = self.equations.acceleration(t, x, v)

@@ -19,7 +19,7 @@ CELLS_AT_ONCE = 10**7
 
 
 class Leap(NamedTuple):
-    """What `FusedMotion.leap` did. status: as `kernel/adaptive` has it. work, loss: of loads and damping."""
+    """What `CompiledMotion.leap` did. status: as `kernel/adaptive` has it. work, loss: of loads and damping."""
 
     status: int
     time: float
@@ -31,16 +31,16 @@ class Leap(NamedTuple):
     speed: float
 
 
-def fused_motion(equations: Equations) -> FusedMotion | None:
+def compiled_motion(equations: Equations) -> CompiledMotion | None:
     """For one rank, one material, an element with such kernels, nothing driven along, a mass that is factored; else None."""
     model = equations.assembly.model
     simple = equations.comm.size == 1 and len(model.regions) == 1 and not equations.is_driven
     fits = simple and kernel_set(model.element).force_of_all is not None and equations.solver.is_factored
-    return FusedMotion(equations) if fits else None
+    return CompiledMotion(equations) if fits else None
 
 
-class FusedMotion:
-    """Rates of change and steps of a body that `fused_motion` took.
+class CompiledMotion:
+    """Rates of change and steps of a body that `compiled_motion` took.
 
     steady: whether the loads stay as they are. at_once: evaluations of forces of one leap.
     """

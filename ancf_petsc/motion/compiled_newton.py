@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from ancf_petsc.algebra.envelope import envelope, factorise
 from ancf_petsc.kernel.implicit import DONE, WANTS_FACTOR, Progress, Scheme, Test
+from ancf_petsc.motion.compiled import CompiledMotion
 from ancf_petsc.motion.equations import Equations
-from ancf_petsc.motion.fused import FusedMotion
 from ancf_petsc.motion.increment import MOST_ITERATIONS, ROUNDING, SLOW, IncrementSolver
 from ancf_petsc.solve.petsc import begins_a_given_option
 
@@ -16,14 +16,14 @@ MOST_ENTRIES = 200_000
 """Of a factor: beyond, sparse factors are quicker, and their callers' time counts little."""
 
 
-class FusedNewton:
+class CompiledNewton:
     """Steps of generalised alpha for a body that `fits`, with the matrix and the tolerance of its IncrementSolver.
 
     aged: whether the factor is to be made anew.
     """
 
-    def __init__(self, fused: FusedMotion, equations: Equations, solver: IncrementSolver) -> None:
-        self.fused, self.equations, self.solver = fused, equations, solver
+    def __init__(self, compiled: CompiledMotion, equations: Equations, solver: IncrementSolver) -> None:
+        self.compiled, self.equations, self.solver = compiled, equations, solver
         self.aged = True
         self._pointers, self._columns = solver.matrix.mat.getRowIJ()
         self._starts = envelope(self._pointers, self._columns)
@@ -50,7 +50,7 @@ class FusedNewton:
             rounding = ROUNDING * self.solver.matrix.largest_diagonal
             test = Test(self.solver.relative, 0.0, rounding, SLOW, MOST_ITERATIONS)
             factor = (self._starts, self._factor)
-            status, progress = self.fused.implicit((*state, d), progress, times, scheme, test, factor)
+            status, progress = self.compiled.implicit((*state, d), progress, times, scheme, test, factor)
             self.aged = bool(progress.aged)
             if status != WANTS_FACTOR or not self._renew():
                 break
