@@ -13,7 +13,7 @@ from ancf_petsc import case_from_dict
 from ancf_petsc.analysis.modes import find_modes
 from ancf_petsc.model.ramp import Ramp
 from ancf_petsc.model.work import PathWork
-from ancf_petsc.plan.plan import output_times
+from ancf_petsc.plan.outputs import output_times
 from ancf_petsc.solve.load_path import Marks
 from ancf_petsc.solve.newton import Newton
 from ancf_petsc.solve.petsc import petsc_options

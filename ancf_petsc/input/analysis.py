@@ -28,10 +28,10 @@ class StaticsSpec(Table):
     tolerance: float = key("a number in (0, 1); relative, such as 1e-10", 1e-10, gt=0, lt=1)
     smallest_step: float = key("a number in (0, 1]; of pseudo-time, such as 1e-4", 1e-4, gt=0, le=1)
 
-    control: Annotated[str, one_of(("load", "arc_length"), "a control")] = key(
+    control: Annotated[str, one_of(lambda: ("load", "arc_length"), "a control")] = key(
         '"load" or "arc_length"; what leads along the path', "load"
     )
-    on_bifurcation: Annotated[str, one_of(("report", "stop", "follow"), "an answer")] = key(
+    on_bifurcation: Annotated[str, one_of(lambda: ("report", "stop", "follow"), "an answer")] = key(
         'one of "report", "stop", "follow"; what to do where equilibria lose their stability', "report"
     )
 
