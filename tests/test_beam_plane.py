@@ -60,6 +60,10 @@ SAID = {
     "gravity": ({"load": [{"type": "gravity", "acceleration": [0.0, 9.81, 0.0]}]}, "z"),
     "a velocity": ({"initial": {"velocity": [1.0, 0.0, 2.0]}}, "y"),
     "a spin": ({"initial": {"spin": [0.0, 3.0, 0.0]}}, "y"),
+    "gravity of a rotated model": (
+        {"load": [{"type": "gravity", "acceleration": [0.0, 6e-16, -9.81]}]},
+        "y",
+    ),
     "another spin": ({"initial": {"spin": [1.0, 0.0, 3.0]}}, "z"),
     "a motion": ({"supports": {"first": {"fix": ["x"], "move": {"z": 0.1}}}}, "y"),
     "pins": ({"supports": PINS}, "y"),

@@ -112,3 +112,19 @@ def test_driven_nodes_gather_no_rounding_from_what_a_method_extrapolates(name):
     rows = np.array(followed.rows)
     assert np.abs(rows - rows[0]).max() <= 1e-12 * np.abs(rows[0]).max()
     assert max(step.newton for step in followed.steps) <= 4
+
+
+@pytest.mark.parametrize("amount", [1e-3, 1e-9])
+@pytest.mark.parametrize("name", ["generalized_alpha", "energy_momentum", "theta", "bdf", "rosenbrock"])
+def test_newton_gets_over_jumps_of_velocities_large_and_small(name, amount):
+    """At the start and twice on the way, of 1e-2 and 1e-8 m/s: tolerances are relative to forces or to what rounding leaves."""
+    jumps = {
+        "group": "hinge",
+        "fix": ["x", "y"],
+        "move": {"z": amount},
+        "ramp": [[0, 0], [0.31, 1], [0.62, 0], [1, 0.5]],
+    }
+    how = {"duration": 0.3, "outputs": 3, "step": 2e-3, "integrator": name}
+    followed = Followed(pendulum(how, constraint=[jumps], load=[]))
+    assert max(step.newton for step in followed.steps) <= 6
+    assert np.abs(followed.velocities).max() < 100 * amount

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from family import mesh_of
-from motion_cases import PROJECT, Followed, pendulum
+from motion_cases import GRAVITY, PROJECT, Followed, pendulum
 
 from ancf_petsc import CaseError, case_from_dict, run
 from ancf_petsc.errors import MotionStopped
@@ -34,6 +34,21 @@ def test_a_corner_beside_an_output_is_that_output(method, corner):
     size = np.abs(exact.velocities).max()
     np.testing.assert_allclose(near.positions, exact.positions, rtol=0, atol=1e-10)
     np.testing.assert_allclose(near.velocities, exact.velocities, rtol=0, atol=1e-9 * size)
+
+
+@pytest.mark.parametrize("method", ["generalized_alpha", "central_difference", "runge_kutta_5dp"])
+def test_a_corner_of_a_load_beside_an_output_is_that_output(method):
+    """In compiled loops too, which this body moves in."""
+    found = []
+    for corner in (0.7, *NEAR.values()):
+        dynamics = {"duration": 0.2, "outputs": 10, "integrator": method}
+        dynamics |= {"tolerance": 1e-6} if method == "runge_kutta_5dp" else {"step": 4e-4}
+        ramp = [[0, 0], [corner, 1], [1, 0.5]]
+        followed = Followed(pendulum(dynamics, load=[{**GRAVITY, "ramp": ramp}]), lambda m: m.integrator.time)
+        assert np.diff(followed.rows).min() > 1e-5
+        found.append(followed.velocities)
+    for velocities in found[1:]:
+        np.testing.assert_allclose(velocities, found[0], rtol=0, atol=1e-8 * np.abs(found[0]).max())
 
 
 @pytest.mark.parametrize("duration", [0.1, 0.3, 0.7])

@@ -16,7 +16,7 @@ from ancf_petsc.plan.space import Space
 NodesOf = Callable[[str, str], NDArray[np.int64]]
 """Nodes of a group, whose name stands under a key."""
 ACROSS = 1e-9
-"""A direction whose component is smaller than this does not leave a plane."""
+"""A direction does not leave a plane when its component across is smaller than this part of it."""
 
 
 def plane_normal(space: Space, spec: CaseSpec, nodes_of: NodesOf, file: Path | None) -> int | None:
@@ -36,7 +36,12 @@ def plane_normal(space: Space, spec: CaseSpec, nodes_of: NodesOf, file: Path | N
             expected="a line in a plane x-y, y-z or z-x",
             cure="turn the mesh",
         )
-    acting = {i: key for key, vector in _actions(space, spec) for i in flat if abs(vector[i]) > 0.0}
+    acting = {
+        i: key
+        for key, vector in _actions(space, spec)
+        for i in flat
+        if abs(vector[i]) > ACROSS * np.linalg.norm(vector)
+    }
     normal = flat[0] if len(flat) == 1 else _of_beam(space, spec, nodes_of, file, flat, acting)
     if normal in acting:
         raise CaseError(
@@ -58,7 +63,8 @@ def _actions(space: Space, spec: CaseSpec) -> Iterator[tuple[str, NDArray]]:
     if spec.initial:
         yield "initial.velocity", np.array(spec.initial.velocity)
         turning = np.abs(np.cross(spec.initial.spin, space.axes.T)).max(axis=0)
-        yield "initial.spin", np.where(turning > ACROSS * np.linalg.norm(spec.initial.spin), turning, 0.0)
+        about_itself = np.linalg.norm(turning) <= ACROSS * np.linalg.norm(spec.initial.spin)
+        yield "initial.spin", np.zeros(3) if about_itself else turning
 
 
 def _of_beam(
