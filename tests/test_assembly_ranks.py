@@ -1,0 +1,82 @@
+"""What is assembled on 1, 2 and 3 ranks: tangents against differences of the forces."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from element_cells import CODES
+from family import mesh_of, unit_cube
+
+from ancf_petsc.element.catalog import element
+
+SECTION = {"thickness": 0.7, "plane": "strain"}
+
+
+def body(code: str, folder: Path) -> dict:
+    """No two cells alike, two laws, one side held in x and moved in z (a beam in x and z): it is never solved."""
+    row = element(code)
+    mesh = (
+        mesh_of("pendulum", code, (6, 1, 1), folder)
+        if row.is_beam
+        else unit_cube(code, 3 if row.cell_name == "quad" else 2, folder, odd=True)
+    )
+    laws = [{"law": "svk", "young": 1.0, "poisson": 0.3, "density": 1.0}]
+    data = {
+        "title": f"Tangents of {code}",
+        "mesh": {"file": str(mesh), "element": code},
+        "groups": {"side": {"plane": "x", "at": "min"}, "half": {"box": [[-9, -9, -9], [0.75, 9, 9]]}},
+        "material": laws,
+        "constraint": [{"group": "side", "fix": ["x"], "move": {"z" if row.components == 3 else "y": 0.02}}],
+        "dynamics": {"duration": 1.0, "step": 0.1},
+    }
+    if row.is_beam:
+        data["section"] = {"area": 0.01, "inertia": 1e-5}
+        data["constraint"][0]["move"] = {"z": 0.02}
+    else:
+        laws.append({"law": "neo_hooke", "young": 3.0, "poisson": 0.2, "density": 1.0, "group": "half"})
+    if row.cell_name == "quad":
+        data["section"] = SECTION
+    return data
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory, environment):
+    """For each element what `tangents_on_ranks` finds on one, two and three ranks."""
+    import subprocess
+    import sys
+
+    folder = tmp_path_factory.mktemp("tangents")
+    (folder / "cases.json").write_text(json.dumps({code: body(code, folder) for code in CODES}))
+    program = Path(__file__).with_name("tangents_on_ranks.py")
+    command = ["mpiexec", "-n", "3", sys.executable, str(program), str(folder / "cases.json")]
+    said = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
+    assert said.returncode == 0, said.stderr
+    return json.loads(said.stdout.partition("FOUND")[2])
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_tangents_are_the_differences_of_the_forces_on_any_number_of_ranks(code, found):
+    """Along random directions: to 1e-9, the differences being exact to about 1e-10. Rows and columns of driven degrees of
+    freedom are left out, with the mean of the other diagonal terms on their diagonal.
+    """
+    for ranks, errors in zip((1, 2, 3), found[code], strict=True):
+        assert errors["driven"] > 0
+        for name in ("tangent", "tangent_product", "mean_tangent"):
+            assert errors[name] < 1e-9, f"{name} on {ranks} ranks"
+        for name in ("tangent where driven", "mean_tangent where driven"):
+            assert errors[name] < 1e-13, f"{name} on {ranks} ranks"
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_mean_forces_do_the_work_that_the_energy_grows_by(code, found):
+    """An identity: rounding over the difference of two energies."""
+    assert [errors["work of mean_force"] for errors in found[code]] == pytest.approx([0.0] * 3, abs=1e-11)
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_energy_and_smallest_determinant_count_every_cell_once(code, found):
+    one, *others = found[code]
+    for name in ("energy", "smallest_det", "driven"):
+        assert [other[name] for other in others] == pytest.approx([one[name]] * 2, rel=1e-12)
