@@ -105,7 +105,7 @@ def main() -> None:
             name: [every[0][name]["alone_or_two"], every[1][name]["alone_or_two"], found[name]["three"]]
             for name in cases
         }
-        print("FOUND" + json.dumps(told))
+        sys.stdout.write("FOUND" + json.dumps(told))
 
 
 if __name__ == "__main__":

@@ -12,6 +12,8 @@ from family import mesh_of, unit_cube
 from ancf_petsc.element.catalog import element
 
 SECTION = {"thickness": 0.7, "plane": "strain"}
+# Differences are exact to 1e-10; neo-Hooke's mean stress divides the rise of the energy, which is rounded, by small strains.
+TOLERANCES = {"tangent": 1e-9, "tangent_product": 1e-9, "mean_tangent": 2e-8}
 
 
 def body(code: str, folder: Path) -> dict:
@@ -58,13 +60,13 @@ def found(tmp_path_factory, environment):
 
 @pytest.mark.parametrize("code", CODES)
 def test_tangents_are_the_differences_of_the_forces_on_any_number_of_ranks(code, found):
-    """Along random directions: to 1e-9, the differences being exact to about 1e-10. Rows and columns of driven degrees of
-    freedom are left out, with the mean of the other diagonal terms on their diagonal.
+    """Along random directions. Rows and columns of driven degrees of freedom are left out, with the mean of the other
+    diagonal terms on their diagonal.
     """
     for ranks, errors in zip((1, 2, 3), found[code], strict=True):
         assert errors["driven"] > 0
-        for name in ("tangent", "tangent_product", "mean_tangent"):
-            assert errors[name] < 1e-9, f"{name} on {ranks} ranks"
+        for name, most in TOLERANCES.items():
+            assert errors[name] < most, f"{name} on {ranks} ranks"
         for name in ("tangent where driven", "mean_tangent where driven"):
             assert errors[name] < 1e-13, f"{name} on {ranks} ranks"
 
