@@ -12,7 +12,8 @@ from family import mesh_of, unit_cube
 from ancf_petsc.element.catalog import element
 
 SECTION = {"thickness": 0.7, "plane": "strain"}
-# Differences are exact to 1e-10, 2e-9 where beams are bent sharply; neo-Hooke's mean stress divides the rise of the energy, which is rounded, by small strains.
+# Differences are exact to 1e-10, 2e-9 where beams are bent sharply; neo-Hooke's mean stress divides the rise of the
+# energy, which is rounded, by small strains.
 TOLERANCES = {"tangent": 1e-8, "tangent_product": 1e-8, "mean_tangent": 2e-8}
 
 
