@@ -39,6 +39,7 @@ def one_brick(folder: Path) -> Iterator[Row]:
 
     _, exact = reference_fall("pendulum_3843_1x1x1.csv")
     for rule, bound in (("default", 2e-4), ("exact", 1e-6)):
+        (folder / rule).mkdir()
         times, found = fall_of_one_brick(rule, folder / rule)
         apart = np.abs(found - exact)
         what = f"one 3843, {rule} rule"
