@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from verify_table import ROOT, Row, absolute, check, measure, relative
 
-from ancf_petsc.case.load import load_case
-from ancf_petsc.case.run import run_case
+from ancf_petsc.analysis.run import run_case
+from ancf_petsc.input.load import load_case
 from ancf_petsc.results.tables import read_table
 
 CASES = ROOT / "cases"
@@ -33,7 +33,9 @@ def reference_motions(folder: Path) -> Iterator[Row]:
         yield measure(f"{case}: largest distance of {len(apart)} samples", apart.max(), 1e-8, "m")
 
 
-@check("Motions against other codes", "a numpy code of its own with DOP853, whose forces are integrated exactly")
+@check(
+    "Motions against other codes", "a numpy code of its own with DOP853, whose forces are integrated exactly"
+)
 def one_brick(folder: Path) -> Iterator[Row]:
     from family import fall_of_one_brick, reference_fall
 
@@ -80,7 +82,9 @@ def free_flight(folder: Path) -> Iterator[Row]:
     for case, trapezoidal in (("case.toml", "trapezoidal.toml"), ("fast.toml", "fast_trapezoidal.toml")):
         curve = read_table(run_of(f"tumbling_block/{case}")[0] / "curve.csv")
         energy = curve["kinetic_energy"] + curve["strain_energy"]
-        yield measure(f"tumbling_block/{case}: relative change of energy", np.abs(energy / energy[0] - 1).max(), 1e-8)
+        yield measure(
+            f"tumbling_block/{case}: relative change of energy", np.abs(energy / energy[0] - 1).max(), 1e-8
+        )
         for name in ("momentum", "angular_momentum"):
             vectors = np.stack([curve[f"{name}.{axis}"] for axis in "xyz"], axis=1)
             change = np.linalg.norm(vectors - vectors[0], axis=1).max() / np.linalg.norm(vectors[0])
@@ -90,10 +94,14 @@ def free_flight(folder: Path) -> Iterator[Row]:
         energy = curve["kinetic_energy"] + curve["strain_energy"]
         what = f"tumbling_block/{trapezoidal}: energy over its first value"
         note = f"{'fails' if error else 'ends'} at step {curve['steps'].sum():.0f}"
-        yield Row(what, float(energy.max() / energy[0]), None, float(energy.max() / energy[0]), None, note=note)
+        yield Row(
+            what, float(energy.max() / energy[0]), None, float(energy.max() / energy[0]), None, note=note
+        )
 
 
-@check("Conservation", "statics of another code (tests/reference/bar_tension.csv); energy, loss and work balance")
+@check(
+    "Conservation", "statics of another code (tests/reference/bar_tension.csv); energy, loss and work balance"
+)
 def damped_bar(folder: Path) -> Iterator[Row]:
     from motion_cases import run_of
 
@@ -104,7 +112,9 @@ def damped_bar(folder: Path) -> Iterator[Row]:
     yield measure("bar_tension: energy balance over external work", balance, 1e-6)
 
 
-@check("Conservation", "statics: the distance of slow damped motion from it is the drag, inverse to the duration")
+@check(
+    "Conservation", "statics: the distance of slow damped motion from it is the drag, inverse to the duration"
+)
 def slow_loading(folder: Path) -> Iterator[Row]:
     changes = {"material.density": 1350.0, "constraint.top.move": {"z": -0.01}}
 
@@ -118,7 +128,9 @@ def slow_loading(folder: Path) -> Iterator[Row]:
         dynamics = {"duration": duration, "step": duration / 100, "outputs": 10, "damping": 500.0}
         apart = np.abs(force(statics=None, dynamics=dynamics) - still).max() / np.abs(still).max()
         what = f"PVC block pressed by 10 mm in {duration:g} s: distance from statics"
-        yield measure(what, apart, None) if before is None else relative(
-            what, apart, before / 2, 0.05, note="half of the one before"
+        yield (
+            measure(what, apart, None)
+            if before is None
+            else relative(what, apart, before / 2, 0.05, note="half of the one before")
         )
         before = apart

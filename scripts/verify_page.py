@@ -66,7 +66,11 @@ def mutations_part(rows: list[dict[str, Any]]) -> list[str]:
         "",
     ]
     if survivors:
-        lines += ["Those that no test tried catches:", "", "| change | file | what it breaks | why it survives |"]
+        lines += [
+            "Those that no test tried catches:",
+            "",
+            "| change | file | what it breaks | why it survives |",
+        ]
         lines += ["|---|---|---|---|"]
         for row in survivors:
             words = (row["name"], f"`{row['file']}`", row["breaks"], row["why"])

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from verify_table import ROOT, Row, absolute, check, measure, relative
 
 from ancf_petsc import case_from_dict, load_case, run
-from ancf_petsc.case.vibration import COLUMNS, find_modes
+from ancf_petsc.analysis.modes import COLUMNS, find_modes
 from ancf_petsc.mesh.generate import make_mesh
 from ancf_petsc.solve.newton import Newton
 
@@ -41,7 +41,9 @@ def uniaxial_stress(law: str, stretch: float) -> float:
     return (shear * (stretch**2 - 1) + lame * np.log(stretch * b**2)) / stretch
 
 
-@check("Closed forms", "uniaxial stress of both laws by hand; the cube has a side of 0.1 m, a quarter is meshed")
+@check(
+    "Closed forms", "uniaxial stress of both laws by hand; the cube has a side of 0.1 m, a quarter is meshed"
+)
 def uniaxial_stretch(folder: Path) -> Iterator[Row]:
     for code, divisions in SOLIDS.items():
         mesh = make_mesh("cube", folder / f"{code}.msh", divisions=divisions, hexahedra=code[:2] == "38")
@@ -64,7 +66,10 @@ def uniaxial_stretch(folder: Path) -> Iterator[Row]:
             yield relative(what, force, uniaxial_stress(law, stretch) * 0.01, 1e-8, "N")
 
 
-@check("Closed forms", "an affine state is in equilibrium whatever the cells: the patch test, Newton from beside it")
+@check(
+    "Closed forms",
+    "an affine state is in equilibrium whatever the cells: the patch test, Newton from beside it",
+)
 def patch_test(folder: Path) -> Iterator[Row]:
     from family import held_all_around, unit_cube
 
@@ -81,11 +86,15 @@ def patch_test(folder: Path) -> Iterator[Row]:
             # Supports hold nodes where they were: here they are put where the affine state has them.
             outcome = newton.solve(0.0, x)
             apart = np.abs(x.array_r.reshape(-1, 3) - affine).max() if outcome.converged else np.nan
-            yield measure(f"{code}, {law}: largest distance from the affine state over its size", apart, 1e-11)
+            yield measure(
+                f"{code}, {law}: largest distance from the affine state over its size", apart, 1e-11
+            )
             newton.destroy()
 
 
-@check("Closed forms", "hanging bar without lateral contraction: E l (l^2 - 1) / 2 = rho g (L - X), integrated")
+@check(
+    "Closed forms", "hanging bar without lateral contraction: E l (l^2 - 1) / 2 = rho g (L - X), integrated"
+)
 def bar_under_its_weight(folder: Path) -> Iterator[Row]:
     length, young, weight = 0.5, 2e5, 7800.0 * 9.81
 
@@ -140,7 +149,9 @@ def frequencies_of_beams(folder: Path) -> Iterator[Row]:
     rows = find_modes(case, folder / "rod", 8, loaded=False, force=False)
     rod = 4 * 0.5 * np.sqrt(7800.0 / 2e5)
     nearest = rows[np.abs(rows[:, 2] - rod).argmin(), 2]
-    yield relative("3413, bar without contraction: axial period", nearest, rod, 2e-3, "s", "ten layers of cells")
+    yield relative(
+        "3413, bar without contraction: axial period", nearest, rod, 2e-3, "s", "ten layers of cells"
+    )
 
 
 @check("Statics against other codes", "dolfinx 0.5.2 with MUMPS: force of the whole block at five strokes")
@@ -167,7 +178,9 @@ def cube_force(folder: Path) -> Iterator[Row]:
     yield relative("cube with bonded faces, svk, pressed by 15 mm: force", force, -2110.66766346, 1e-7, "N")
 
 
-@check("Statics against other codes", "an independent numpy and numba kernel with scipy's solvers, ten digits")
+@check(
+    "Statics against other codes", "an independent numpy and numba kernel with scipy's solvers, ten digits"
+)
 def bar_in_tension(folder: Path) -> Iterator[Row]:
     from statics_cases import bar
 
@@ -183,10 +196,15 @@ def bar_in_tension(folder: Path) -> Iterator[Row]:
                 found = result.probes[f"{name}.uz"][-1]
                 yield absolute(f"{what}: {name}", found, wanted[column], 2e-10, "m")
             weight = 120.0 + gravity * 7800 * 9.81 * 0.005
-            yield relative(f"{what}: reaction", result.curve["top.rz"][-1], weight, 1e-9, "N", "load and weight")
+            yield relative(
+                f"{what}: reaction", result.curve["top.rz"][-1], weight, 1e-9, "N", "load and weight"
+            )
 
 
-@check("Statics against other codes", "dolfinx 0.5.2 on the same tetrahedra; a numpy code for elements with slopes")
+@check(
+    "Statics against other codes",
+    "dolfinx 0.5.2 on the same tetrahedra; a numpy code for elements with slopes",
+)
 def cantilever(folder: Path) -> Iterator[Row]:
     from family import cantilever as bent
     from family import mesh_of

@@ -15,10 +15,10 @@ import numpy as np
 from mpi4py import MPI
 
 from ancf_petsc import case_from_dict
-from ancf_petsc.case.build import build
+from ancf_petsc.analysis.build import build
+from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.solve.newton import Newton
 from ancf_petsc.solve.stability import weakest_cell, why_it_ends
-from ancf_petsc.system.assembly import Assembly
 
 WAVES = np.array(
     [[31.0, 7.0, -19.0], [11.0, -37.0, 23.0], [-13.0, 29.0, 41.0]]
@@ -42,7 +42,7 @@ def describe(data: dict[str, Any], state: dict[str, Any], comm: MPI.Comm) -> dic
         "weakest": [cell, stretch, det, centroid.tolist(), law],
     }
     if comm.size == 1:
-        rows, n = newton.matrix, newton.matrix.getSize()[0]
+        rows, n = newton.matrix.mat, newton.matrix.mat.getSize()[0]
         tangent = np.array([[rows.getValue(i, j) for j in range(n)] for i in range(n)])
         found["negative"] = int((np.linalg.eigvalsh(tangent) < 0.0).sum())
     newton.destroy()

@@ -10,9 +10,9 @@ from typing import Any
 from mpi4py import MPI
 
 from ancf_petsc import case_from_dict
-from ancf_petsc.case.build import build
+from ancf_petsc.analysis.build import build
+from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.solve.newton import Newton
-from ancf_petsc.system.assembly import Assembly
 
 
 def pushed(assembly: Assembly) -> Any:

@@ -16,8 +16,8 @@ import numpy as np
 from mpi4py import MPI
 
 from ancf_petsc import case_from_dict
-from ancf_petsc.case.build import build
-from ancf_petsc.system.assembly import Assembly
+from ancf_petsc.analysis.build import build
+from ancf_petsc.model.assembly import Assembly
 
 STEP = (
     5e-5  # of differences of fourth order between cells of 0.1 to 1: truncation below 1e-11, rounding 1e-11
@@ -60,8 +60,9 @@ def compare(data: dict[str, Any], comm: MPI.Comm) -> dict[str, float]:
     before, x = state(assembly, 1), state(assembly, 2)
     driven = (assembly.model.motion[: assembly.model.owned] >= 0).ravel()
     forces = {"tangent": assembly.internal_force, "mean_tangent": partial(assembly.mean_force, before)}
-    fill = {"tangent": assembly.tangent, "mean_tangent": partial(assembly.mean_tangent, before)}
-    matrix = assembly.create_matrix(symmetric=False)
+    add = {"tangent": assembly.add_tangent, "mean_tangent": partial(assembly.add_mean_tangent, before)}
+    filled = assembly.create_matrix(symmetric=False)
+    matrix = filled.mat
     answer: dict[str, float] = {}
 
     def note(name: str, found: np.ndarray, wanted: np.ndarray) -> None:
@@ -72,7 +73,9 @@ def compare(data: dict[str, Any], comm: MPI.Comm) -> dict[str, float]:
         direction = np.random.default_rng((seed, comm.rank)).normal(size=len(driven))
         free = np.where(driven, 0.0, direction)
         for name, force in forces.items():
-            fill[name](x, matrix)
+            filled.clear()
+            add[name](x, filled)
+            filled.finish()
             slope = difference(assembly, force, x, free)
             note(name, product(assembly, matrix, free), np.where(driven, 0.0, slope))
             diagonal = matrix.getDiagonal().array_r

@@ -11,10 +11,10 @@ from statics_cases import block
 
 from ancf_petsc import case_from_dict, run
 from ancf_petsc.mesh.generate import make_mesh
+from ancf_petsc.model.measures import von_mises
 from ancf_petsc.post import figures
 from ancf_petsc.post.units import ENERGY_OF, STRESS_OF, read_units
 from ancf_petsc.post.view import Look, describe, label, scalars
-from ancf_petsc.system.measures import von_mises
 
 mpl.use("Agg")
 SIDE, WIDTH = 0.1, 0.05  # of the shipped cube, a quarter of which is meshed

@@ -19,8 +19,8 @@ from ancf_petsc import open_results
 from ancf_petsc.cli import main
 from ancf_petsc.errors import NoEquilibrium
 from ancf_petsc.mesh.generate import make_mesh
+from ancf_petsc.solve.load_path import LoadPath
 from ancf_petsc.solve.newton import Newton, Outcome
-from ancf_petsc.solve.statics import LoadPath
 
 SIDE, WIDTH = 0.1, 0.05  # of the shipped cube, a quarter of which is meshed
 WEIGHT = 1e3  # acceleration of gravity: a quarter's weight is then 250 N, a seventh of the force
