@@ -25,7 +25,19 @@ def test_there_are_enough_changes_of_every_folder(mutate):
     plan = mutate.Plan()
     names = [change["name"] for change in plan.changes]
     assert len(names) == len(set(names)) >= 60
-    assert {"kernel", "algebra", "material", "model", "plan", "solve", "motion", "analysis", "results", "post"} <= {plan.folder(c) for c in plan.changes}
+    folders = {
+        "kernel",
+        "algebra",
+        "material",
+        "model",
+        "plan",
+        "solve",
+        "motion",
+        "analysis",
+        "results",
+        "post",
+    }
+    assert folders <= {plan.folder(change) for change in plan.changes}
 
 
 def test_a_text_that_is_gone_or_twice_there_is_told(mutate, project, tmp_path):
