@@ -60,3 +60,25 @@ def test_the_force_scale_is_the_larger_of_loads_and_reactions(total, tmp_path):
         scale = max(np.linalg.norm(balance[driven]), np.linalg.norm(loads))
         first = newton.solve(1.0, x.copy()).residuals[0]
         assert first == pytest.approx(free / scale, rel=1e-12)
+
+
+@pytest.mark.parametrize("gravity", [False, True])
+def test_the_predicted_state_errs_with_the_square_of_the_step(gravity, tmp_path):
+    """The tangent at the start of a path: moved nodes by the columns of driven degrees of freedom, and loads."""
+    data = block("cube_m2.msh", 0.01)
+    data["constraint"][-1]["ramp"] = "linear"
+    if gravity:
+        data["material"]["density"] = 1e4
+        data["load"] = [{"type": "gravity", "acceleration": [30.0, 0.0, -100.0]}]
+    assembly = assembly_of(data, tmp_path)
+    newton = Newton(assembly, 1e-12)
+    errors, moved = [], []
+    for s in (0.05, 0.1):
+        x = assembly.reference_vector()
+        assert newton.predict(x, 0.0, s)
+        predicted = x.array_r.copy()
+        assert newton.solve(s, x).converged
+        errors.append(np.linalg.norm(predicted - x.array_r))
+        moved.append(np.linalg.norm(predicted - assembly.reference_vector().array_r))
+    assert errors[1] / errors[0] == pytest.approx(4.0, rel=0.1)
+    assert errors[1] < 0.05 * moved[1]
