@@ -56,7 +56,7 @@ def found(tmp_path_factory, environment):
     for code in CODES:  # once, not on three ranks at the same time
         compile_kernels(element(code), list(LAWS.values()), mean=True)
     program = Path(__file__).with_name("tangents_on_ranks.py")
-    command = ["mpiexec", "-n", "3", sys.executable, str(program), str(folder / "cases.json")]
+    command = ["mpiexec", "-n", "3", sys.executable, "-m", "mpi4py", str(program), str(folder / "cases.json")]
     said = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
     assert said.returncode == 0, said.stderr
     return json.loads(said.stdout.partition("FOUND")[2])

@@ -228,7 +228,7 @@ def ends(cube, environment, tmp_path_factory):
     given = {name: (cases[name], state) for name, state in STATES.items()}
     (folder / "cases.json").write_text(json.dumps(given))
     program = Path(__file__).with_name("ends_on_ranks.py")
-    command = ["mpiexec", "-n", "3", sys.executable, str(program), str(folder / "cases.json")]
+    command = ["mpiexec", "-n", "3", sys.executable, "-m", "mpi4py", str(program), str(folder / "cases.json")]
     said = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
     assert said.returncode == 0, said.stderr
     meshes = dict.fromkeys(STATES, cube) | {"column": column}

@@ -109,7 +109,7 @@ def test_one_inverted_cell_on_one_rank_is_refused_by_all(mpirun, tmp_path):
     data["mesh"]["file"] = str(make_mesh("cube", tmp_path / "tall.msh", divisions=(2, 2, 8)))
     (tmp_path / "case.json").write_text(json.dumps(data))
     program = Path(pushed.__code__.co_filename)
-    said = mpirun(3, [program, tmp_path / "case.json"])
+    said = mpirun(3, ["-m", "mpi4py", program, tmp_path / "case.json"])
     found = json.loads(said.stdout.partition("FOUND")[2])
     assert [rank["own"] > 0.0 for rank in found].count(True) >= 1
     assert all(rank["smallest"] < 0.0 for rank in found)
