@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -49,16 +47,14 @@ def body(code: str, folder: Path) -> dict:
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory, environment):
+def found(tmp_path_factory, on_three_ranks):
     """For each element what `tangents_on_ranks` finds on one, two and three ranks."""
     folder = tmp_path_factory.mktemp("tangents")
     (folder / "cases.json").write_text(json.dumps({code: body(code, folder) for code in CODES}))
     for code in CODES:  # once, not on three ranks at the same time
         compile_kernels(element(code), list(LAWS.values()), mean=True)
     program = Path(__file__).with_name("tangents_on_ranks.py")
-    command = ["mpiexec", "-n", "3", sys.executable, "-m", "mpi4py", str(program), str(folder / "cases.json")]
-    said = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
-    assert said.returncode == 0, said.stderr
+    said = on_three_ranks(program, folder / "cases.json")
     return json.loads(said.stdout.partition("FOUND")[2])
 
 

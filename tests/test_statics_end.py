@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import meshio
@@ -211,7 +209,7 @@ CURES = {
 
 
 @pytest.fixture(scope="module")
-def ends(cube, environment, tmp_path_factory):
+def ends(cube, on_three_ranks, tmp_path_factory):
     """What `ends_on_ranks` says of the states: on one rank, on each of two, on each of three; and the mesh of each."""
     folder = tmp_path_factory.mktemp("ends")
     column = make_mesh("cube", folder / "column.msh", divisions=(1, 1, 8))
@@ -228,9 +226,7 @@ def ends(cube, environment, tmp_path_factory):
     given = {name: (cases[name], state) for name, state in STATES.items()}
     (folder / "cases.json").write_text(json.dumps(given))
     program = Path(__file__).with_name("ends_on_ranks.py")
-    command = ["mpiexec", "-n", "3", sys.executable, "-m", "mpi4py", str(program), str(folder / "cases.json")]
-    said = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
-    assert said.returncode == 0, said.stderr
+    said = on_three_ranks(program, folder / "cases.json")
     meshes = dict.fromkeys(STATES, cube) | {"column": column}
     return json.loads(said.stdout.partition("FOUND")[2]), meshes
 

@@ -103,13 +103,13 @@ def test_the_first_inverted_region_counts_where_the_last_is_whole(cube, tmp_path
         assert smallest < 0.0
 
 
-def test_one_inverted_cell_on_one_rank_is_refused_by_all(mpirun, tmp_path):
+def test_one_inverted_cell_on_one_rank_is_refused_by_all(on_three_ranks, tmp_path):
     """A free node at an edge is pushed through its cells; on three ranks some ranks do not see them."""
     data = block(cube.name, 0.01, steps=1)
     data["mesh"]["file"] = str(make_mesh("cube", tmp_path / "tall.msh", divisions=(2, 2, 8)))
     (tmp_path / "case.json").write_text(json.dumps(data))
     program = Path(pushed.__code__.co_filename)
-    said = mpirun(3, ["-m", "mpi4py", program, tmp_path / "case.json"])
+    said = on_three_ranks(program, tmp_path / "case.json")
     found = json.loads(said.stdout.partition("FOUND")[2])
     assert [rank["own"] > 0.0 for rank in found].count(True) >= 1
     assert all(rank["smallest"] < 0.0 for rank in found)
