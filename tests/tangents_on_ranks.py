@@ -67,7 +67,7 @@ def compare(data: dict[str, Any], comm: MPI.Comm) -> dict[str, float]:
 
     def note(name: str, found: np.ndarray, wanted: np.ndarray) -> None:
         sums = comm.allreduce(np.array([np.abs(found - wanted).sum(), np.abs(wanted).sum()]))
-        answer[name] = max(answer.get(name, 0.0), sums[0] / sums[1])
+        answer[name] = float(np.maximum(answer.get(name, 0.0), sums[0] / sums[1]))  # nan stays
 
     for seed in range(DIRECTIONS):
         direction = np.random.default_rng((seed, comm.rank)).normal(size=len(driven))
