@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import matplotlib as mpl
+import meshio
 import numpy as np
 import pytest
 from statics_cases import block
@@ -39,7 +40,13 @@ def sheared(mesh: Path, symmetry: float, law: str) -> dict:
 
 @pytest.fixture(scope="module")
 def cube(tmp_path_factory) -> Path:
-    return make_mesh("cube", tmp_path_factory.mktemp("cube") / "cube.msh", divisions=(2, 2, 2))
+    """Cells of unequal size: the middle planes are moved towards the far sides."""
+    path = make_mesh("cube", tmp_path_factory.mktemp("cube") / "cube.msh", divisions=(2, 2, 2))
+    mesh = meshio.read(path)
+    sizes = np.array([WIDTH, WIDTH, SIDE])
+    mesh.points += 0.6 * mesh.points * (1.0 - mesh.points / sizes)
+    mesh.write(path, file_format="gmsh22", binary=False)
+    return path
 
 
 def both(data, folder):
