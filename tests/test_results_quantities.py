@@ -8,6 +8,7 @@ import matplotlib as mpl
 import meshio
 import numpy as np
 import pytest
+from bodies import assembly_of
 from statics_cases import block
 
 from ancf_petsc import case_from_dict, run
@@ -116,6 +117,28 @@ def test_every_column_of_a_motion_is_there(motion):
     columns = {"kinetic_energy", "potential_energy", "dissipated_energy", "external_work", "energy_drift"}
     assert columns <= motion[0].curve.keys()
     assert all(np.abs(motion[0].curve[name]).max() > 0.0 for name in columns)
+
+
+# --- loads
+
+
+def test_a_traction_is_shared_by_area(cube, tmp_path):
+    """A third of each facet's share of the whole area on each of its corners; the facets differ in size."""
+    data = sheared(cube, 1.0, "svk")
+    total = np.array([3.0, -2.0, 7.0])
+    data["load"] = [{"type": "force", "group": "top", "total": total.tolist()}]
+    model = assembly_of(data, tmp_path).model
+    place = model.reference
+    on_top = np.abs(place[:, 2] - SIDE) < 1e-12
+    facets = [cell[on_top[cell]] for cell in model.cells if on_top[cell].sum() == 3]
+    areas = np.array([np.linalg.norm(np.cross(*(place[f[1:]] - place[f[0]]))) / 2 for f in facets])
+    assert areas.sum() == pytest.approx(WIDTH**2, rel=1e-12)
+    assert areas.max() > 1.5 * areas.min()
+    shares = np.zeros(len(place))
+    for facet, area in zip(facets, areas, strict=True):
+        shares[facet] += area / areas.sum() / 3
+    (load,) = model.loads
+    np.testing.assert_allclose(load.pattern, np.outer(shares, total), atol=1e-14)
 
 
 # --- stresses
