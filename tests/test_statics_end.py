@@ -17,7 +17,7 @@ from ancf_petsc import open_results
 from ancf_petsc.cli import main
 from ancf_petsc.errors import NoEquilibrium
 from ancf_petsc.mesh.generate import make_mesh
-from ancf_petsc.solve.load_path import LoadPath
+from ancf_petsc.solve.load_path import LoadPath, Marks
 from ancf_petsc.solve.newton import Newton, Outcome
 
 SIDE, WIDTH = 0.1, 0.05  # of the shipped cube, a quarter of which is meshed
@@ -51,13 +51,13 @@ class Choosy(Newton):
         super().__init__(assembly, 1e-9)
         self.at, self.refused = 0.0, []
 
-    def solve(self, s, x):
+    def solve(self, s, x, *, careful=False):
         if s - self.at > self.longest * (1 + 1e-9) or s > self.limit:
             self.refused.append(s - self.at)
             return Outcome(converged=False, reason="refused", newton=0, linear=0, residuals=())
-        outcome = super().solve(s, x)
+        outcome = super().solve(s, x, careful=careful)
         assert outcome.converged
-        self.at = s
+        self.at = max(s, self.at)
         return outcome
 
 
@@ -67,7 +67,7 @@ def follow(cube, folder, outputs, **limits):
     for name, value in limits.items():
         setattr(newton, name, value)
     steps, error = [], None
-    path = LoadPath(newton, outputs, [], 1e-3, lambda step, x: steps.append(step))
+    path = LoadPath(newton, Marks.of(outputs, []), 1e-3, lambda step, x: steps.append(step))
     try:
         path.run()
     except NoEquilibrium as problem:
@@ -86,8 +86,10 @@ def test_steps_that_fail_are_halved_until_they_converge(cube, tmp_path):
     assert sizes[0] == pytest.approx(0.025, rel=1e-12)
     assert sizes.max() <= 0.04 * (1 + 1e-9)
     assert sizes.min() > 0.04 / 4
-    # Refused sizes come in pairs: from the extrapolated state and from the tangent's, once there are enough states.
-    assert path.newton.refused[:2] == pytest.approx([0.1, 0.05], rel=1e-12)
+    # What is refused is tried again from other predictions before it is halved.
+    refused = np.round(path.newton.refused, 12)
+    assert list(dict.fromkeys(refused))[:2] == [0.1, 0.05]
+    assert refused.min() > 0.04
     np.testing.assert_allclose(np.diff([0.0] + [step.s for step in steps]), sizes, rtol=1e-12)
 
 
