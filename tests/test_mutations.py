@@ -81,6 +81,6 @@ def test_machine_code_made_of_a_changed_file_is_left_out_of_the_copied_cache(mut
     """What `envelope` changes, motions inline and generic kernels do not; what `tensor` changes, all inline."""
     found = mutate._dependents(project, "ancf_petsc/algebra/envelope.py")
     assert {"envelope", "motion", "implicit"} <= found
-    assert "generic" not in found
+    assert "point_solid" not in found
     found = mutate._dependents(project, "ancf_petsc/material/tensor.py")
-    assert {"generic", "tet3413", "models", "motion", "blocks"} <= found
+    assert {"point_solid", "tet3413", "models", "motion", "blocks"} <= found
