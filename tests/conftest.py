@@ -102,6 +102,18 @@ def mpirun(environment: dict[str, str], tmp_path: Path) -> Program:
     return run
 
 
+@pytest.fixture(scope="session")
+def on_three_ranks(environment: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Program:
+    """on_three_ranks(*args, timeout=120): `mpirun` on three ranks for fixtures of a module; a rank that fails ends the others."""
+    folder = tmp_path_factory.mktemp("ranks")
+
+    def run(*args: str | Path, timeout: float = 120) -> subprocess.CompletedProcess[str]:
+        command = ["mpiexec", "-n", "3", sys.executable, "-m", "mpi4py", *args]
+        return _run(command, environment, timeout, 0, folder)
+
+    return run
+
+
 @pytest.fixture
 def ancf(environment: dict[str, str], tmp_path: Path) -> Program:
     """ancf(*args, ranks=None, timeout=120, code=0, cwd=tmp_path): the command line in a process of its own.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from ancf_petsc.material.models import LAWS
@@ -18,19 +19,26 @@ CRUSHED = 0.1
 """Of det F: no law here was measured there."""
 PAST_A_LIMIT = 'a displacement in place of the force, or statics.control = "arc_length", goes past it'
 LARGEST_TO_FACTOR = 300_000
+ALIKE = 1e-6
+"""Stretches of cells that differ by less, relatively, are taken as equal: rounding depends on the number of ranks."""
 
 
 def weakest_cell(assembly: Assembly, x: PETSc.Vec) -> tuple[float, float, int, np.ndarray, str]:
-    """Smallest principal stretch of all cells, with det F, the cell's number, its undeformed centroid, its law."""
+    """Smallest principal stretch of all cells, with det F, the cell's number, its undeformed centroid, its law.
+
+    Of cells that are stretched alike, the one with the lowest number, whatever the number of ranks. Collective.
+    """
     model = assembly.model
     stretch, det = _stretches(assembly, x)
-    found = (np.inf, 0.0, -1, np.zeros(3), "")
-    if len(stretch):
-        e = int(np.argmin(stretch))
+    least = combined(assembly.comm, float(stretch.min(initial=np.inf)), MPI.MIN)
+    alike = np.flatnonzero(stretch <= least * (1.0 + ALIKE))
+    found = (np.inf, 0.0, np.iinfo(np.int64).max, np.zeros(3), "")
+    if len(alike):
+        e = int(alike[np.argmin(model.cell_numbers[alike])])
         law = next(region.law.name for region in model.regions if region.first <= e < region.last)
         centroid = model.origin + model.reference[model.position_cells()[e]].mean(axis=0)
         found = (float(stretch[e]), float(det[e]), int(model.cell_numbers[e]), centroid, law)
-    return min(assembly.comm.allgather(found), key=lambda item: item[0])
+    return min(assembly.comm.allgather(found), key=lambda item: item[2])
 
 
 def beyond_the_law(assembly: Assembly, x: PETSc.Vec) -> str | None:

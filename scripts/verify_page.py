@@ -1,0 +1,96 @@
+"""docs/verification.md from docs/verification/checks.json and mutations.json."""
+
+from __future__ import annotations
+
+import json
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+CHECKS, MUTATIONS = DOCS / "verification" / "checks.json", DOCS / "verification" / "mutations.json"
+PAGE = DOCS / "verification.md"
+HEAD = """# Verification
+
+*Made by `scripts/verify` from `docs/verification/`; do not edit.* `scripts/verify` computes every number under *found* again and
+ends with exit code 1 if an error is beyond its bound. `scripts/mutate` makes the last table.
+"""
+
+
+def number(value: float | None) -> str:
+    """Ten digits at most; errors are written by `brief`."""
+    return "" if value is None else f"{value:.10g}"
+
+
+def brief(value: float | None) -> str:
+    return "" if value is None else f"{value:.2g}"
+
+
+def cell(text: str) -> str:
+    """Text that does not break a table."""
+    return text.replace("|", "\\|").replace("\n", " ")
+
+
+def checks_part(data: dict[str, Any]) -> list[str]:
+    """A heading a section, a table a check."""
+    lines = [f"Computed by ancf_petsc {data['version']}, {data['versions']}.", ""]
+    rows = sum(len(check["rows"]) for check in data["checks"])
+    failed = [row for check in data["checks"] for row in check["rows"] if not row["holds"]]
+    lines += [f"{rows - len(failed)} of {rows} numbers are within their bounds.", ""]
+    for section, checks in groupby(data["checks"], key=lambda check: check["section"]):
+        lines += [f"## {section}", ""]
+        for check in checks:
+            lines += [f"**{check['name'].replace('_', ' ').capitalize()}**. Source: {check['source']}.", ""]
+            lines += ["| what | found | reference | error | bound | note |", "|---|---|---|---|---|---|"]
+            for row in check["rows"]:
+                unit = f" {row['unit']}" if row["unit"] else ""
+                reference = f"{number(row['reference'])}{unit}" if row["reference"] is not None else ""
+                found = number(row["found"]) if row["reference"] is not None else brief(row["found"])
+                error = brief(row["error"]) if row["reference"] is not None else ""
+                note = row["note"] if row["holds"] else f"**beyond its bound** {row['note']}"
+                words = (row["what"], f"{found}{unit}", reference, error, brief(row["bound"]), note)
+                lines.append("| " + " | ".join(cell(word) for word in words) + " |")
+            lines.append("")
+    return lines
+
+
+def mutations_part(rows: list[dict[str, Any]]) -> list[str]:
+    """Wrong changes: survivors first, then which test caught each."""
+    survivors = [row for row in rows if not row["caught_by"]]
+    caught = len(rows) - len(survivors)
+    lines = [
+        "## Wrong changes that the tests see",
+        "",
+        f"`scripts/mutate` applies {len(rows)} wrong changes to the source, one at a time, and runs the tests: {caught} are caught "
+        f"({100 * caught / max(len(rows), 1):.0f} %).",
+        "",
+    ]
+    if survivors:
+        lines += [
+            "Those that no test tried catches:",
+            "",
+            "| change | file | what it breaks | why it survives |",
+        ]
+        lines += ["|---|---|---|---|"]
+        for row in survivors:
+            words = (row["name"], f"`{row['file']}`", row["breaks"], row["why"])
+            lines.append("| " + " | ".join(cell(word) for word in words) + " |")
+        lines.append("")
+    lines += ["| change | file | what it breaks | caught by |", "|---|---|---|---|"]
+    for row in rows:
+        if row["caught_by"]:
+            test = row["caught_by"].removeprefix("tests/")
+            words = (row["name"], f"`{row['file']}`", row["breaks"], f"`{test}`")
+            lines.append("| " + " | ".join(cell(word) for word in words) + " |")
+    return [*lines, ""]
+
+
+def write_page() -> Path:
+    """Write the page from what is there."""
+    lines = [HEAD]
+    if CHECKS.is_file():
+        lines += checks_part(json.loads(CHECKS.read_text()))
+    if MUTATIONS.is_file():
+        lines += mutations_part(json.loads(MUTATIONS.read_text()))
+    PAGE.write_text("\n".join(lines).rstrip("\n") + "\n", encoding="utf-8")
+    return PAGE
