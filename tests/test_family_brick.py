@@ -10,7 +10,7 @@ from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.element.cell import CELLS
 from ancf_petsc.kernel import point_solid
 from ancf_petsc.kernel.interface import Span, Target
-from ancf_petsc.kernel.tables import make_tables, turn_functions
+from ancf_petsc.kernel.tables import make_tables, map_functions
 from ancf_petsc.material import LAWS
 from ancf_petsc.model.mass import mean_products
 
@@ -83,8 +83,8 @@ def program():
 
 def test_mass_is_that_of_the_derivation(program):
     row, tables, _ = program
-    half = np.stack([turn_functions(m, tables.jacobians, row)[0] for m in mean_products(row)], axis=0)
-    mass = DENSITY * np.stack([turn_functions(m, tables.jacobians, row)[0] for m in half.T], axis=1)
+    half = np.stack([map_functions(m, tables.jacobians, row)[0] for m in mean_products(row)], axis=0)
+    mass = DENSITY * np.stack([map_functions(m, tables.jacobians, row)[0] for m in half.T], axis=1)
     wanted = DENSITY * np.einsum("g,ga,gb->ab", WEIGHTS, VALUES, VALUES)
     np.testing.assert_allclose(mass, wanted, rtol=0, atol=1e-12 * wanted.max())
     assert mass[::4, ::4].sum() == pytest.approx(DENSITY, rel=1e-13)

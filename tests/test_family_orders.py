@@ -81,7 +81,7 @@ class Manufactured:
         self.places = np.einsum("qc,eci->eqi", linear, corners)
 
     def _turn(self, values):
-        return np.stack([self.model.turned(v) for v in values], axis=1)
+        return np.stack([self.model.mapped(v) for v in values], axis=1)
 
     def integral(self, density):
         """Of values (e, q) over the body."""

@@ -102,7 +102,7 @@ def test_a_folder_that_has_gone_is_named(tmp_path):
 def test_a_full_disk_leaves_whole_steps(noticed, store, tmp_path, monkeypatch):
     """HDF5 1.10 crashes at the end of the process if what it could not write is still in its hands."""
     if noticed != "beforehand":
-        monkeypatch.setattr(space.Space, "reserve", lambda self, size: None)
+        monkeypatch.setattr(space.DiskSpace, "reserve", lambda self, size: None)
     with largest_file(500_000):
         whole, said = fill(store)
     assert 1 <= whole < 50
@@ -132,7 +132,7 @@ from ancf_petsc.results import space
 from ancf_petsc.results.store import ResultStore
 folder, reserve, way = Path(sys.argv[1]), sys.argv[2], sys.argv[3]
 if reserve == "not":
-    space.Space.reserve = lambda self, size: None
+    space.DiskSpace.reserve = lambda self, size: None
 comm = MPI.COMM_WORLD
 own = np.full((1000, 3), float(comm.rank))
 resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, resource.RLIM_INFINITY))
@@ -178,7 +178,9 @@ def hold(path, mode):
 def test_a_program_that_opened_it_for_writing_stops_the_run_unharmed(tmp_path, monkeypatch):
     """On closing, such a program writes what it knew of the file, and what was added since is lost."""
     monkeypatch.setattr(space, "WAIT", 0.2)
-    monkeypatch.setattr(space.Space, "_lock", lambda self, number: None)  # it came before the first output
+    monkeypatch.setattr(
+        space.DiskSpace, "_lock", lambda self, number: None
+    )  # it came before the first output
     store = ResultStore(tmp_path, MPI.COMM_SELF, "t", "SI")
     points, cells = run.mesh()
     store.write_mesh(points, "tetra", cells, np.arange(8), np.arange(6))

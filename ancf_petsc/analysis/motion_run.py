@@ -131,7 +131,7 @@ class MotionRun:
             balance = self.equations.out_of_balance(now, x, v, self._acceleration())
             more = {**self._energies(), **self._momenta(), **self._since}
             row = self.record.write({"time": now}, x, balance, more, {"velocity": v})
-            self._tell(row)
+            self._log_output(row)
         self._since = dict.fromkeys(MOTION_COUNTS, 0)
         self._written = now
 
@@ -164,7 +164,7 @@ class MotionRun:
         columns = {f"momentum.{axis}": linear[i] for i, axis in enumerate(AXES)}
         return columns | {f"angular_momentum.{axis}": angular[i] for i, axis in enumerate(AXES)}
 
-    def _tell(self, row: dict[str, float]) -> None:
+    def _log_output(self, row: dict[str, float]) -> None:
         now, spent = self.integrator.time, time.perf_counter() - self._begun
         rate = now / spent if spent else 0.0
         left = (self.duration - now) / rate if rate else 0.0

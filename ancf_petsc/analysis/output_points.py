@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ancf_petsc.analysis.file_order import FileOrder
-from ancf_petsc.kernel.tables import turn_functions
+from ancf_petsc.kernel.tables import map_functions
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import ToSlabs
 
@@ -27,7 +27,7 @@ class OutputPoints:
         corners = np.array(row.cell.corners, dtype=float)
         values = row.values(corners[np.array(row.cell.edges)].mean(axis=1))
         self._vectors = assembly.model.cells[cells]
-        self._weights = turn_functions(values[edges], maps[cells], row)
+        self._weights = map_functions(values[edges], maps[cells], row)
 
     def __call__(self, field: Floats) -> Floats:
         """A field (n, 3) on owned nodal vectors, as positions are, on this rank's slab of the points (m, 3)."""

@@ -32,7 +32,7 @@ RISE = tuple(k / 10 for k in range(1, 11))
 class StaticRun:
     """Follows the load path and records it.
 
-    times: pseudo-times of the outputs. watch: told the part of the path done, 0 to 1. stop: asked after each
+    times: pseudo-times of the outputs. watch(part): called with the part of the path done, 0 to 1. stop: asked after each
     step whether to end.
     """
 
@@ -127,7 +127,7 @@ class StaticRun:
         self._count(step)
         if step.output:
             self._write(step.s, x, out_of_balance)
-        self._tell(step, x, out_of_balance)
+        self._log_step(step, x, out_of_balance)
         self.watch(step.s)
 
     def _on_event(self, event: CriticalPoint, x: PETSc.Vec, where: str = "") -> None:
@@ -162,7 +162,7 @@ class StaticRun:
             self.newton.set_pseudo_time(path.s)
             self._write(path.s, path.x, self.newton.out_of_balance(path.x))
 
-    def _tell(self, step: PathStep, x: PETSc.Vec, out_of_balance: NDArray) -> None:
+    def _log_step(self, step: PathStep, x: PETSc.Vec, out_of_balance: NDArray) -> None:
         curve = self.record.curve(x, out_of_balance)
         shown = "".join(f"  {name} {value:12.6g}" for name, value in curve.items())
         log.info(

@@ -53,15 +53,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as leave:
         return leave.code if isinstance(leave.code, int) else int(leave.code is not None)
     except AncfError as error:
-        return _tell(error)
+        return _print_error(error)
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("ancf_petsc"):
             raise
         cure = "run scripts/setup, or use environment.yml"
-        return _tell(EnvironmentProblem(f"the Python package {error.name} is missing; {cure}"))
+        return _print_error(EnvironmentProblem(f"the Python package {error.name} is missing; {cure}"))
     except KeyboardInterrupt:
         _abort_others(Interrupted.exit_code)
-        return _tell(Interrupted("interrupted"))
+        return _print_error(Interrupted("interrupted"))
     except BrokenPipeError:
         _abort_others(BROKEN_PIPE)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -71,7 +71,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if rank_count() > 1:  # of this rank alone, for all one knows
             print(f"error: rank {rank()}: {problem}", file=sys.stderr, flush=True)
             _abort_others(problem.exit_code)
-        return _tell(problem)
+        return _print_error(problem)
     except Exception:
         if rank_count() == 1:
             raise
@@ -191,7 +191,7 @@ def _unknown_verb(word: str) -> CaseError:
     return CaseError("unknown verb", file="ancf", got=word, cure=cure)
 
 
-def _tell(error: AncfError) -> int:
+def _print_error(error: AncfError) -> int:
     """One line on stderr by the root rank; the exit code.
 
     A rank that never met MPI leaves with 0: failing first, it would make the launcher end the root unheard.

@@ -83,8 +83,8 @@ def _show(report: dict[str, Any]) -> None:
     for mesh, found in report["yardstick"].items():
         copied = " and ".join(f"{rate:.3g}" for rate in found["copy_gb_s"])
         gathered = " and ".join(f"{time:.3g}" for time in found["gather_scatter_ns"])
-        told = f"copy {copied} GB/s, gather and scatter {gathered} ns/element, on 1 and 2 processes"
-        facts.append((f"yardstick {mesh}", told))
+        measured = f"copy {copied} GB/s, gather and scatter {gathered} ns/element, on 1 and 2 processes"
+        facts.append((f"yardstick {mesh}", measured))
     show_facts(facts)
     show_table(COLUMNS, [_line(name, result) for name, result in report["results"].items()])
     for name, result in report["results"].items():

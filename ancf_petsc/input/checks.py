@@ -280,7 +280,7 @@ def _section(spec: CaseSpec) -> Problems:
 
 
 def _held_slopes(spec: CaseSpec) -> Problems:
-    """Only elements with slopes can hold some. What is no code at all is told when the element is looked up."""
+    """Only elements with slopes can hold some. What is no code at all is refused when the element is looked up."""
     code = spec.mesh.element
     try:
         if dncm.parse(code).vectors > 1:

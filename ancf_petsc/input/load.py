@@ -47,12 +47,12 @@ class Case:
         """
         data = toml.parse(self.text)
         for path, value in changes.items():
-            way, rest = split_path(path)
+            keys, rest = split_path(path)
             if rest:
                 raise CaseError(
                     got=path, expected="a dotted path to a key", cure='quote odd names: groups."a b".at'
                 )
-            set_value(data, way, deepcopy(value))
+            set_value(data, keys, deepcopy(value))
         return _checked(data, self.file, self.folder, self.name)
 
 
@@ -101,9 +101,9 @@ def case_from_dict(data: Mapping[str, Any], folder: str | Path, name: str = "cas
 
 
 def _checked(
-    data: dict[str, Any], file: Path | None, folder: Path, name: str, told: str | Path | None = None
+    data: dict[str, Any], file: Path | None, folder: Path, name: str, label: str | Path | None = None
 ) -> Case:
-    _refuse_nul(data, told or file or name)
+    _refuse_nul(data, label or file or name)
     source = _tuples(data)
     frozen = dict(source)
     if isinstance(source.get("material"), dict):
@@ -112,7 +112,7 @@ def _checked(
         spec = CaseSpec.model_validate(frozen)
         check(spec)
     except ValidationError as error:
-        raise case_error(error, frozen, source, told or file or name) from None
+        raise case_error(error, frozen, source, label or file or name) from None
     return Case(spec, file, folder, name, toml.write(data))
 
 

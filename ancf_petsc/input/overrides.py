@@ -22,16 +22,16 @@ TEXTS = {("mesh", "element"), ("mesh", "file"), ("title",), ("units",)}
 def apply_settings(data: dict[str, Any], settings: Iterable[str]) -> None:
     """Apply `path=value` texts to the tables of a case, in order; `path=` alone takes the key away."""
     for setting in settings:
-        way, rest = split_path(setting)
+        keys, rest = split_path(setting)
         if not rest.startswith("="):
             raise CaseError(
                 file=SET, got=setting, expected="key=value", cure="such as --set material.law=neo_hooke"
             )
         text = rest[1:].strip()
         if text:
-            set_value(data, way, _value(way, text))
+            set_value(data, keys, _value(keys, text))
         else:
-            remove_value(data, way)
+            remove_value(data, keys)
 
 
 def split_path(text: str) -> tuple[tuple[str, ...], str]:
@@ -59,33 +59,33 @@ def _unquoted(text: str) -> str:
         return text
 
 
-def _value(way: tuple[str, ...], text: str) -> Any:
+def _value(keys: tuple[str, ...], text: str) -> Any:
     """The TOML value of `text`; a word that is none is text, so are numbers where codes or names stand."""
     try:
         tables = tomllib.loads(f"value = {text}")
         value = tables["value"] if len(tables) == 1 else None
     except (tomllib.TOMLDecodeError, RecursionError):
-        value = text if text and (way in TEXTS or BARE_WORD.fullmatch(text)) else None
+        value = text if text and (keys in TEXTS or BARE_WORD.fullmatch(text)) else None
     if value is None:
         raise CaseError(
             file=SET,
-            key=".".join(way),
+            key=".".join(keys),
             got=text,
             expected="a TOML value",
             cure="such as 1e-3, neo_hooke, '[0, 0, -9.81]' or '{ z = -0.025 }'; quote it for the shell",
         )
-    return text if way in TEXTS and not isinstance(value, str | list | dict) else value
+    return text if keys in TEXTS and not isinstance(value, str | list | dict) else value
 
 
-def set_value(data: dict[str, Any], way: Sequence[str], value: Any) -> None:
-    """Put `value` at the end of `way`; None takes the key away.
+def set_value(data: dict[str, Any], keys: Sequence[str], value: Any) -> None:
+    """Put `value` at the end of the path `keys`; None takes the key away.
 
-    Entries of arrays go by their name or group, or by index from 0. Tables on the way are made when the
-    format knows them. Raises CaseError for a way that leads nowhere.
+    Entries of arrays go by their name or group, or by index from 0. Tables on the path are made when the
+    format knows them. Raises CaseError for a path that leads nowhere.
     """
     place: Any = data
-    for depth, name in enumerate(way[:-1]):
-        here = way[: depth + 1]
+    for depth, name in enumerate(keys[:-1]):
+        here = keys[: depth + 1]
         if isinstance(place, dict):
             if name not in place:
                 place[name] = _new_table(data, here)
@@ -93,19 +93,19 @@ def set_value(data: dict[str, Any], way: Sequence[str], value: Any) -> None:
         elif isinstance(place, list):
             place = place[_index(place, here)]
         else:
-            raise _nowhere(way[:depth], f"is no table: it holds {place!r}")
-    _assign(place, way, value)
+            raise _nowhere(keys[:depth], f"is no table: it holds {place!r}")
+    _assign(place, keys, value)
 
 
-def remove_value(data: dict[str, Any], way: Sequence[str]) -> None:
-    """Remove the key, table or entry at the end of `way`. Raises CaseError where there is none."""
+def remove_value(data: dict[str, Any], keys: Sequence[str]) -> None:
+    """Remove the key, table or entry at the end of the path `keys`. Raises CaseError where there is none."""
     place: Any = data
-    for depth in range(len(way)):
-        here = way[: depth + 1]
+    for depth in range(len(keys)):
+        here = keys[: depth + 1]
         if isinstance(place, list):
             key: Any = _index(place, here)
-        elif isinstance(place, dict) and way[depth] in place:
-            key = way[depth]
+        elif isinstance(place, dict) and keys[depth] in place:
+            key = keys[depth]
         else:
             there = tuple(place) if isinstance(place, dict) else ()
             raise CaseError(
@@ -113,53 +113,53 @@ def remove_value(data: dict[str, Any], way: Sequence[str]) -> None:
                 file=SET,
                 key=".".join(here),
                 expected="a key of the case; key= without a value removes it",
-                cure=did_you_mean(way[depth], there),
+                cure=did_you_mean(keys[depth], there),
             )
-        if depth < len(way) - 1:
+        if depth < len(keys) - 1:
             place = place[key]
     del place[key]
 
 
-def _assign(place: Any, way: Sequence[str], value: Any) -> None:
+def _assign(place: Any, keys: Sequence[str], value: Any) -> None:
     if isinstance(place, list):
-        where: Any = _index(place, way)
+        where: Any = _index(place, keys)
     elif isinstance(place, dict):
-        where = way[-1]
+        where = keys[-1]
     else:
-        raise _nowhere(way[:-1], f"is no table: it holds {place!r}")
+        raise _nowhere(keys[:-1], f"is no table: it holds {place!r}")
     if value is not None:
         place[where] = value
     elif isinstance(place, list) or where in place:
         del place[where]
 
 
-def _new_table(data: dict[str, Any], way: Sequence[str]) -> dict[str, Any]:
+def _new_table(data: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
     arrays = ("constraint", "load", "probe")
     known = tuple(name for name in CaseSpec.model_fields if name not in arrays)
-    if len(way) == 1 and way[0] not in known:
-        if way[0] in arrays:
+    if len(keys) == 1 and keys[0] not in known:
+        if keys[0] in arrays:
             raise CaseError(
                 "the case has none",
                 file=SET,
-                key=way[0],
-                expected=f"a [[{way[0]}]] in the file",
+                key=keys[0],
+                expected=f"a [[{keys[0]}]] in the file",
                 cure="add it there",
             )
         raise CaseError(
-            "unknown key", file=SET, key=way[0], cure=did_you_mean(way[0], tuple(CaseSpec.model_fields))
+            "unknown key", file=SET, key=keys[0], cure=did_you_mean(keys[0], tuple(CaseSpec.model_fields))
         )
     return {}
 
 
-def _nowhere(way: Sequence[str], what: str) -> CaseError:
+def _nowhere(keys: Sequence[str], what: str) -> CaseError:
     return CaseError(
-        what, file=SET, key=".".join(way), expected="a table on the way", cure="shorten the path"
+        what, file=SET, key=".".join(keys), expected="a table on the path", cure="shorten the path"
     )
 
 
-def _index(entries: list[Any], way: Sequence[str]) -> int:
-    """Which entry of an array the last name of `way` means."""
-    name = way[-1]
+def _index(entries: list[Any], keys: Sequence[str]) -> int:
+    """Which entry of an array the last of `keys` means."""
+    name = keys[-1]
     labels = [entry_label(entry) for entry in entries]
     count = labels.count(name)
     if count == 1:
@@ -170,7 +170,7 @@ def _index(entries: list[Any], way: Sequence[str]) -> int:
         raise CaseError(
             f"{count} entries are called {name!r}",
             file=SET,
-            key=".".join(way),
+            key=".".join(keys),
             expected="one entry",
             cure=f"use the index: {' or '.join(places)}",
         )
@@ -179,7 +179,7 @@ def _index(entries: list[Any], way: Sequence[str]) -> int:
     raise CaseError(
         f"no entry {name!r}",
         file=SET,
-        key=".".join(way),
+        key=".".join(keys),
         expected=f"a name, a group or an index from 0 to {len(entries) - 1}",
         cure=did_you_mean(name, tuple(listing)),
     )

@@ -15,18 +15,18 @@ from ancf_petsc.jit import kernel
 
 
 @register_jitable
-def turn_rows(matrix, slot, J, turned):
-    """Rows for the slopes of nodes into `turned` (a, b) from rows (a, b) for slopes along xi. J (s, 3, 3)."""
+def map_rows(matrix, slot, J, mapped):
+    """Rows for the slopes of nodes into `mapped` (a, b) from rows (a, b) for slopes along xi. J (s, 3, 3)."""
     slopes = slot.max()
     for a in range(slot.size):
         j = slot[a]
         for b in range(matrix.shape[1]):
             if j == 0:
-                turned[a, b] = matrix[a, b]
+                mapped[a, b] = matrix[a, b]
             else:
-                turned[a, b] = 0.0
+                mapped[a, b] = 0.0
                 for k in range(slopes):
-                    turned[a, b] += J[a // (slopes + 1), j - 1, k] * matrix[a - j + 1 + k, b]
+                    mapped[a, b] += J[a // (slopes + 1), j - 1, k] * matrix[a - j + 1 + k, b]
 
 
 @register_jitable
@@ -55,8 +55,8 @@ def add_mass(cells, weights, shape_mass, slot, jacobians, lumped, first, last, p
     half, local = np.empty((n, n)), shape_mass.copy()
     for e in range(first, last):
         if jacobians.shape[1] > 0:
-            turn_rows(shape_mass, slot, jacobians[e], half)
-            turn_rows(half.T, slot, jacobians[e], local)
+            map_rows(shape_mass, slot, jacobians[e], half)
+            map_rows(half.T, slot, jacobians[e], local)
         if lumped and (e == first or jacobians.shape[1] > 0):
             lump(local, slot)
         for a in range(n):

@@ -1,7 +1,7 @@
 """What happens at a point of a solid: kernels of any element and any law, the reference of the fast paths.
 
-In each cell nodal vectors are turned to the reference cell, F = base + (sum_a r_a dN_a/dxi) J^-1 at each quadrature point, and
-forces are turned back. A (3 J, 3 L, 9 ik) is dP/dF, G (a, 3) the gradients with respect to X of the functions of the nodal vectors.
+In each cell nodal vectors are mapped to the reference cell, F = base + (sum_a r_a dN_a/dxi) J^-1 at each quadrature point, and
+forces are mapped back. A (3 J, 3 L, 9 ik) is dP/dF, G (a, 3) the gradients with respect to X of the functions of the nodal vectors.
 """
 
 from __future__ import annotations

@@ -69,15 +69,15 @@ def slope_maps(jacobian: Floats, axes: Floats, directions: Floats) -> Floats:
     return full
 
 
-def turn_functions(values: Floats, maps: Floats, element: Element) -> Floats:
+def map_functions(values: Floats, maps: Floats, element: Element) -> Floats:
     """Functions (e, a) of the nodal vectors from those of the reference cell, (a) or (e, a); maps (e, s, 3, 3)."""
     d, (e, s) = element.cell.dimension, maps.shape[:2]
-    turned = np.array(np.broadcast_to(values, (e, element.functions)))
+    mapped = np.array(np.broadcast_to(values, (e, element.functions)))
     if s:
-        by_node = turned[:, : s * (d + 1)].reshape(e, s, d + 1)
+        by_node = mapped[:, : s * (d + 1)].reshape(e, s, d + 1)
         by_node[..., 1:] = np.einsum("esmk,esk->esm", maps[..., :d, :d], by_node[..., 1:])
-        turned[:, : s * (d + 1)] = by_node.reshape(e, s * (d + 1))
-    return turned
+        mapped[:, : s * (d + 1)] = by_node.reshape(e, s * (d + 1))
+    return mapped
 
 
 def reference_functions(

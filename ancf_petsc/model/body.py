@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ancf_petsc.element.element import Element
 from ancf_petsc.kernel.interface import Kernels, Span
-from ancf_petsc.kernel.tables import turn_functions
+from ancf_petsc.kernel.tables import map_functions
 from ancf_petsc.material import Law
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.parallel.numbering import Numbering
@@ -99,9 +99,9 @@ class Body:
         """The owned nodal vectors that are positions."""
         return np.flatnonzero(self.slots[: self.owned] == 0)
 
-    def turned(self, values: NDArray) -> Floats:
+    def mapped(self, values: NDArray) -> Floats:
         """Functions (e, a) of the nodal vectors of all cells from those of the reference cell (a,)."""
-        return turn_functions(values, self.slope_maps, self.element)
+        return map_functions(values, self.slope_maps, self.element)
 
     @property
     def slope_maps(self) -> Floats:

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 from ancf_petsc.element.element import Element
 from ancf_petsc.kernel.constant import add_mass, mass_product
-from ancf_petsc.kernel.tables import turn_functions
+from ancf_petsc.kernel.tables import map_functions
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.parallel.exchange import combined
@@ -65,8 +65,8 @@ class Mass:
         maps, row = self.assembly.model.slope_maps, self.assembly.model.element
         low, high = np.inf, 0.0
         for chunk in np.array_split(maps, len(maps) // CHUNK + 1) if maps.shape[1] else [maps[:1]]:
-            half = np.stack([turn_functions(shape, chunk, row) for shape in self._shape], axis=1)
-            mass = np.stack([turn_functions(half[:, :, b], chunk, row) for b in range(row.functions)], axis=2)
+            half = np.stack([map_functions(shape, chunk, row) for shape in self._shape], axis=1)
+            mass = np.stack([map_functions(half[:, :, b], chunk, row) for b in range(row.functions)], axis=2)
             scale = 1.0 / np.sqrt(np.einsum("eaa->ea", mass))
             values = np.linalg.eigvalsh(scale[:, :, None] * mass * scale[:, None, :])
             low, high = min(low, values.min(initial=np.inf)), max(high, values.max(initial=0.0))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ancf_petsc.element.element import Element
 from ancf_petsc.element.shape import ElementTables
 from ancf_petsc.errors import MeshError
-from ancf_petsc.kernel.tables import nodes_with_slopes, slope_maps, turn_functions
+from ancf_petsc.kernel.tables import map_functions, nodes_with_slopes, slope_maps
 from ancf_petsc.mesh.kinds import part_kind, part_sizes
 from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.mesh.parts import rows_in
@@ -85,7 +85,7 @@ class Space:
             return shares
         sizes = np.abs(part_sizes(self.mesh.points, parts, part_kind(dimension, parts.shape[1])))
         for cells, rows, tables in self._places_of(dimension, parts):
-            means = turn_functions(
+            means = map_functions(
                 tables.weights @ tables.values / tables.weights.sum(), self._maps(cells), self.element
             )
             vectors = self.first[self.cells[cells][:, self.element.node]] + self.element.slot

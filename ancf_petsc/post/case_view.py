@@ -141,17 +141,21 @@ def _add_marks(plotter: pyvista.Plotter, mesh: Mesh, support: Marked) -> Points:
     reached = [np.empty((0, 3))]
     nodes = mesh.points[_spread(mesh, mesh.groups[support.group].nodes)]
     for axis in support.fixed:
-        way = np.eye(3)[AXES.index(axis)]
-        cone = pyvista.Cone(center=-0.5 * way, direction=way, height=1.0, radius=0.35, resolution=12)
+        direction = np.eye(3)[AXES.index(axis)]
+        cone = pyvista.Cone(
+            center=-0.5 * direction, direction=direction, height=1.0, radius=0.35, resolution=12
+        )
         marks = pyvista.PolyData(nodes).glyph(geom=cone, scale=False, orient=False, factor=0.018 * size)
         plotter.add_mesh(marks, color=HELD, ambient=0.4, reset_camera=False)
     moves = np.array([support.moves.get(axis, 0.0) for axis in AXES])
     outwards = nodes.mean(axis=0) - mesh.points[mesh.used].mean(axis=0)
     for vector, colour in ((moves, MOVED), (np.asarray(support.force, float), LOADED)):
         if np.any(vector):
-            way = vector / np.linalg.norm(vector)
-            start = -1.0 if way @ outwards < 0 else 0.0  # outside the body: tips or tails on the nodes
-            arrow = pyvista.Arrow(start=start * way, direction=way, tip_radius=0.09, shaft_radius=0.03)
+            direction = vector / np.linalg.norm(vector)
+            start = -1.0 if direction @ outwards < 0 else 0.0  # outside the body: tips or tails on the nodes
+            arrow = pyvista.Arrow(
+                start=start * direction, direction=direction, tip_radius=0.09, shaft_radius=0.03
+            )
             marks = pyvista.PolyData(nodes).glyph(geom=arrow, scale=False, orient=False, factor=0.09 * size)
             plotter.add_mesh(marks, color=colour, ambient=0.4, reset_camera=False)
             reached.append(marks.points)

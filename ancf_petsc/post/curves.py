@@ -70,6 +70,6 @@ def _loading(stroke: ArrayLike, force: ArrayLike) -> tuple[Curve, Curve]:
     """The rows, first to largest stroke, that go on in the direction of the largest."""
     stroke, force = _pair(stroke, force)
     end = _furthest(stroke) + 1
-    way = np.abs(stroke[:end] - stroke[0])
-    ahead = np.concatenate([[True], way[1:] > np.maximum.accumulate(way)[:-1]])
+    travel = np.abs(stroke[:end] - stroke[0])
+    ahead = np.concatenate([[True], travel[1:] > np.maximum.accumulate(travel)[:-1]])
     return stroke[:end][ahead], force[:end][ahead]

@@ -26,7 +26,7 @@ WAIT = 10.0  # seconds that another program may hold the file for writing
 log = logging.getLogger("ancf")
 
 
-class Space:
+class DiskSpace:
     """Of one file, on the root rank; other ranks only `divert`.
 
     While it is open, a shared lock on the file keeps programs that would write to it out: HDFView or h5py in

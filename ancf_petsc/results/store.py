@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ancf_petsc.errors import EnvironmentProblem, cannot_write
 from ancf_petsc.results.folder import unlocked
-from ancf_petsc.results.space import Space, lengthen
+from ancf_petsc.results.space import DiskSpace, lengthen
 from ancf_petsc.results.xdmf import Dataset, Xdmf, link_name
 
 FORMAT = 1
@@ -78,7 +78,7 @@ class ResultStore:
         self.comm = comm
         self.parallel = comm.size > 1 and (h5py.get_config().mpi if parallel is None else parallel)
         self.steps = 0
-        self._space = Space(self.path)
+        self._space = DiskSpace(self.path)
         self._held: list[h5py.h5d.DatasetID] = []  # of the open file, until all is written
         self._xdmf = Xdmf(self.path.with_suffix(".xdmf"), self.path.name)
         attributes = {"title": title, "units": units, "note": note, "format": FORMAT, "version": version}

@@ -89,17 +89,17 @@ class _Hill:
     def step(self, x: PETSc.Vec, residual: NDArray) -> bool:
         """One step with what the linear solver holds, cut back until the energy or the residual falls enough."""
         assembly, comm = self.assembly, self.assembly.comm
-        rhs, way = assembly.vector(), assembly.vector()
+        rhs, direction = assembly.vector(), assembly.vector()
         rhs.array[:] = -residual
-        self.newton.linear.ksp.solve(rhs, way)
-        longest = max(comm.allgather(float(np.abs(way.array_r).max(initial=0.0))))
-        slope = combined(comm, float(residual @ way.array_r))
+        self.newton.linear.ksp.solve(rhs, direction)
+        longest = max(comm.allgather(float(np.abs(direction.array_r).max(initial=0.0))))
+        slope = combined(comm, float(residual @ direction.array_r))
         norm = combined(comm, float(residual @ residual))
         start, before = x.array_r.copy(), self.energy(x)
         part = min(1.0, LONGEST * assembly.model.size / longest) if longest else 1.0
         taken = False
         while part > 1e-6 and not taken:
-            x.array[:] = start + part * way.array_r
+            x.array[:] = start + part * direction.array_r
             after = self.energy(x)
             taken = after <= before + 1e-4 * part * slope
             if not taken and abs(after - before) <= 1e-13 * abs(before):
@@ -107,5 +107,5 @@ class _Hill:
                 taken = combined(comm, float(now @ now)) < norm
             part /= 2
         rhs.destroy()
-        way.destroy()
+        direction.destroy()
         return taken

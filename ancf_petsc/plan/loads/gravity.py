@@ -31,7 +31,7 @@ def nodal_mass(body: Body, *, lumped: bool) -> Floats:
     for region in body.regions:
         density[region.first : region.last] = region.density or 0.0
     tables = body.element.tables("mass")
-    means = body.turned(tables.weights @ tables.values / tables.weights.sum())
+    means = body.mapped(tables.weights @ tables.values / tables.weights.sum())
     if lumped:
         means = np.broadcast_to(lumped_shares(body.element), body.cells.shape)
     share = (density * body.volumes)[:, None] * means
