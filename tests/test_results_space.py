@@ -369,6 +369,7 @@ def test_a_run_says_what_it_computed_and_is_repeated_by_that(project, tmp_path, 
     assert main(["run", str(out), "--again", "--out", str(tmp_path / "b"), "--quiet"]) == 0
     assert main(["run", str(out), "--again", "--quiet"]) == 0
     assert (tmp_path / "b" / "curve.csv").read_bytes() == (out / "curve.csv").read_bytes()
+    assert json.loads((out / "summary.json").read_text())["case"] == first["case"]
     (out / "summary.json").unlink()  # as in a run that was killed
     assert case_of_run(out).text == text
     mesh.write_bytes(mesh.read_bytes() + b"\n")

@@ -89,7 +89,8 @@ def case_of_run(folder: str | Path, overrides: Sequence[str] = (), petsc_options
     """
     folder = Path(folder)
     said = _recorded(folder)
-    case = case_from_text(said["text"], folder, Path(said["folder"]), said["name"], overrides, petsc_options)
+    source = Path(said["file"] or folder)
+    case = case_from_text(said["text"], source, Path(said["folder"]), said["name"], overrides, petsc_options)
     if str(Path(said["mesh_file"])) != str(case.mesh_file):
         return case
     cure = "bring that file back, or name the mesh by --set mesh.file=FILE"
@@ -107,7 +108,7 @@ def case_of_run(folder: str | Path, overrides: Sequence[str] = (), petsc_options
 
 
 def _recorded(folder: Path) -> dict[str, str]:
-    """text, folder, name, mesh_file, mesh_sha256 of a run: from its summary, or from its results if it was cut short."""
+    """text, file, folder, name, mesh_file, mesh_sha256 of a run: from its summary, or from its results if it was cut short."""
     try:
         said = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         case, mesh = said["case"], said["mesh"]
@@ -127,6 +128,7 @@ def _recorded(folder: Path) -> dict[str, str]:
         )
     return {
         "text": facts["case"],
+        "file": facts["case_file"],
         "folder": facts["case_folder"],
         "name": facts["case_name"],
         "mesh_file": facts["mesh_file"],
