@@ -19,7 +19,7 @@ from ancf_petsc.element.element import Element
 from ancf_petsc.kernel import motion
 from ancf_petsc.kernel.adaptive import leap
 from ancf_petsc.kernel.choice import kernel_set
-from ancf_petsc.kernel.constant import add_mass, add_mass_blocks, mass_product
+from ancf_petsc.kernel.constant import MassCells, add_mass, add_mass_blocks, mass_product
 from ancf_petsc.kernel.explicit import EXPLICIT
 from ancf_petsc.kernel.implicit import Scheme, Test, alpha_steps
 from ancf_petsc.kernel.interface import Means, Span, Target
@@ -101,12 +101,11 @@ def _mass_calls(element: Element, cells: NDArray, graph: tuple, matrix: tuple) -
     maps, slot = np.tile(np.eye(3), (1, nodes_with_slopes(element), 1, 1)), element.slot.astype(np.int32)
     mass, shape_mass = np.zeros(len(columns)), deformed(np.eye(n), 3)
     for lumped in (True, False):
-        yield Call(
-            add_mass, (cells, np.ones(1), shape_mass, slot, maps, lumped, 0, 1, pointers, columns, mass)
-        )
+        mass_cells = MassCells(cells, np.ones(1), shape_mass, slot, maps)
+        yield Call(add_mass, (mass_cells, lumped, Span(0, 1), graph, mass))
     yield Call(mass_product, (pointers, columns, mass, deformed(np.zeros((n, 3)), 4), np.empty((n, 3))))
     none = np.zeros_like(pointers)
-    yield Call(add_mass_blocks, (pointers, columns, mass, 2.0, pointers, none, 9 * n * n, driven, values))
+    yield Call(add_mass_blocks, (graph, mass, 2.0, (pointers, none, 9 * n * n, driven), values))
 
 
 def _block_calls(graph: tuple[NDArray, NDArray]) -> Iterator[Call]:
