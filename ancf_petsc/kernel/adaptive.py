@@ -75,10 +75,10 @@ def size_of(left, proposed):
 
 
 @inlined
-def attempt(y, h, method, given, stages, trial):
-    """The stages of a step h after the first, its error's derivatives among them, and its end in trial (2, n, 3)."""
+def attempt(y, h, method, given, into):
+    """The stages of a step h after the first and its end into stages (s, 2, n, 3) and trial (2, n, 3). given: loads, system."""
     rows, weights, _, _, reuses_last = method
-    loads, system = given
+    (loads, system), (stages, trial) = given, into
     flat = stages.reshape(stages.shape[0], -1)
     for i in range(1, stages.shape[0]):
         combine(y.reshape(-1), h, rows[i, :i], flat, trial.reshape(-1))
@@ -115,7 +115,7 @@ def leap(y, method, course, loads, system):
         asked = size_of(goal - time, proposed)
         h, again = asked, False
         while True:
-            attempt(y, h, method, (loads, system), stages, trial)
+            attempt(y, h, method, (loads, system), (stages, trial))
             error = error_of(h, difference, flat, position, part * speed)
             if not np.isfinite(error):
                 return NOT_FINITE, time, steps, rejected, lost, proposed, speed
