@@ -74,7 +74,7 @@ def law_calls(element: Element, law: Law, *, mean: bool = False, moving: bool = 
         yield Call(kernels.mean_force, ((before, after), *rest, force))
         yield Call(kernels.mean_tangent, ((before, after), *rest, matrix))
     if moving and chosen.force_of_all is not None:
-        body = (chosen.force_of_all(law, tables), tuple(tables), p)
+        body = (chosen.force_of_all(law, tables), tuple(tables), p, (0, 1))
         yield from _motion_calls(body, before, graph)
 
 
