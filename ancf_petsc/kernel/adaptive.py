@@ -8,19 +8,26 @@ to ten times (TSAdapt "basic"). Arrays as in `motion`.
 from __future__ import annotations
 
 import numpy as np
+from numba.extending import register_jitable
 
 from ancf_petsc.jit import kernel
 from ancf_petsc.kernel.motion import rates_at
-from ancf_petsc.material.tensor import inlined
 
 SAFETY, AGAIN, SHORTER, LONGER = 0.9, 0.5, 0.1, 10.0
 REACHED, MORE, TOO_SHORT, NOT_FINITE = range(4)
 
 
-@inlined
+@register_jitable
+def copy(given, into):
+    """Of a flat array."""
+    for m in range(given.size):
+        into[m] = given[m]
+
+
+@register_jitable
 def combine(y, h, weights, stages, trial):
     """trial = y + h sum of weights times stages, all flat."""
-    trial[:] = y
+    copy(y, trial)
     for j in range(weights.size):
         factor, stage = h * weights[j], stages[j]
         if factor != 0.0:
@@ -28,7 +35,7 @@ def combine(y, h, weights, stages, trial):
                 trial[m] += factor * stage[m]
 
 
-@inlined
+@register_jitable
 def error_of(h, difference, stages, position, speed):
     """Root mean square of the difference of the two orders over the tolerances of positions and velocities."""
     half, total = stages.shape[1] // 2, 0.0
@@ -43,7 +50,7 @@ def error_of(h, difference, stages, position, speed):
     return h * np.sqrt(total / stages.shape[1])
 
 
-@inlined
+@register_jitable
 def largest(v):
     """Largest magnitude of a component of a field (n, 3)."""
     top = 0.0
@@ -53,7 +60,7 @@ def largest(v):
     return top
 
 
-@inlined
+@register_jitable
 def loss_of(graph, v, a):
     """v . M v and its rate of change, 2 a . M v."""
     pointers, columns, values = graph
@@ -67,18 +74,18 @@ def loss_of(graph, v, a):
     return loss, rate
 
 
-@inlined
+@register_jitable
 def size_of(left, proposed):
     """Of the next step: two equal ones rather than one and a tiny rest."""
     size = min(left, proposed)
     return left / 2 if size < left < 2 * size else size
 
 
-@inlined
-def attempt(y, h, method, given, stages, trial):
-    """The stages of a step h after the first, its error's derivatives among them, and its end in trial (2, n, 3)."""
+@register_jitable
+def attempt(y, h, method, given, into):
+    """The stages of a step h after the first and its end into stages (s, 2, n, 3) and trial (2, n, 3). given: loads, system."""
     rows, weights, _, _, reuses_last = method
-    loads, system = given
+    (loads, system), (stages, trial) = given, into
     flat = stages.reshape(stages.shape[0], -1)
     for i in range(1, stages.shape[0]):
         combine(y.reshape(-1), h, rows[i, :i], flat, trial.reshape(-1))
@@ -87,7 +94,7 @@ def attempt(y, h, method, given, stages, trial):
         combine(y.reshape(-1), h, weights, flat, trial.reshape(-1))
 
 
-@inlined
+@register_jitable
 def next_size(h, error, order, again):
     """What the control proposes after a step h with this error. again: whether the one before it failed."""
     safety = SAFETY * AGAIN if again and error > 1.0 else SAFETY
@@ -105,7 +112,7 @@ def leap(y, method, course, loads, system):
     """
     (time, goal, shortest, most), (proposed, speed, position, part, growth) = course
     _, _, difference, order, reuses_last = method
-    _, damping, _, graph, _ = system
+    damping, graph = system[1], system[3]
     stages, trial = np.empty((difference.size, *y.shape)), np.empty(y.shape)
     flat = stages.reshape(stages.shape[0], -1)
     steps, rejected, lost = 0, 0, 0.0
@@ -115,7 +122,7 @@ def leap(y, method, course, loads, system):
         asked = size_of(goal - time, proposed)
         h, again = asked, False
         while True:
-            attempt(y, h, method, (loads, system), stages, trial)
+            attempt(y, h, method, (loads, system), (stages, trial))
             error = error_of(h, difference, flat, position, part * speed)
             if not np.isfinite(error):
                 return NOT_FINITE, time, steps, rejected, lost, proposed, speed
@@ -128,9 +135,10 @@ def leap(y, method, course, loads, system):
         kept = asked < proposed and h >= asked * (1 - 1e-9)  # not less for having been cut short
         proposed = max(proposed, following) if kept else following
         time = goal if abs(time + h - goal) <= shortest else time + h
-        y[:], steps = trial, steps + 1
+        copy(trial.reshape(-1), y.reshape(-1))
+        steps += 1
         if reuses_last:
-            stages[0] = stages[-1]
+            copy(flat[-1], flat[0])
         else:
             rates_at(y, loads, system, stages[0])
         top = largest(y[1])

@@ -8,10 +8,28 @@ share a cell is kept, in rows of the graph of `neighbours`:
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba.extending import register_jitable
+from numpy.typing import NDArray
 
 from ancf_petsc.jit import kernel
+from ancf_petsc.kernel.interface import Floats
+
+
+class MassCells(NamedTuple):
+    """Cells with their masses. nodes (e, a): nodal vectors. weights (e,): mass of each cell.
+
+    shape_mass (a, b): mean of N_a N_b over the reference cell. slot (a): 0 for a position, j for the j-th slope.
+    jacobians (e, s, 3, 3): from the slopes of nodes to those along xi.
+    """
+
+    nodes: NDArray[np.int32]
+    weights: Floats
+    shape_mass: Floats
+    slot: NDArray[np.int32]
+    jacobians: Floats
 
 
 @register_jitable
@@ -45,12 +63,10 @@ def lump(mass, slot):
 
 
 @kernel
-def add_mass(cells, weights, shape_mass, slot, jacobians, lumped, first, last, pointers, columns, mass):
-    """Add the mass of cells first:last to `mass`.
-
-    weights (e,): mass of each cell. shape_mass (a, b): mean of N_a N_b over the reference cell. slot (a): 0 for a position,
-    j for the j-th slope. jacobians (e, s, 3, 3): from the slopes of nodes to those along xi.
-    """
+def add_mass(cells, lumped, span, graph, mass):
+    """Add the mass of a span of `MassCells` to `mass`."""
+    nodes, weights, shape_mass, slot, jacobians = cells
+    (first, last), (pointers, columns) = span, graph
     rows, n = pointers.size - 1, slot.size
     half, local = np.empty((n, n)), shape_mass.copy()
     for e in range(first, last):
@@ -60,12 +76,12 @@ def add_mass(cells, weights, shape_mass, slot, jacobians, lumped, first, last, p
         if lumped and (e == first or jacobians.shape[1] > 0):
             lump(local, slot)
         for a in range(n):
-            i = cells[e, a]
+            i = nodes[e, a]
             if i >= rows:
                 continue
             low, high = pointers[i], pointers[i + 1]
             for b in range(n):
-                place = low + np.searchsorted(columns[low:high], cells[e, b])
+                place = low + np.searchsorted(columns[low:high], nodes[e, b])
                 mass[place] += weights[e] * local[a, b]
 
 
@@ -85,12 +101,13 @@ def mass_product(pointers, columns, mass, field, result):
 
 
 @kernel
-def add_mass_blocks(pointers, columns, mass, factor, own_pointers, other_pointers, split, driven, values):
+def add_mass_blocks(graph, mass, factor, places, values):
     """Add factor times the mass to the values of a matrix laid out as the tangent, driven rows and columns left out.
 
-    own_pointers, other_pointers (n + 1,): the graph's entries in owned columns and in ghosts. split: where the values of
-    ghost columns begin. driven (v,): bit c is set where component c is driven.
+    places: own_pointers, other_pointers (n + 1,), the graph's entries in owned columns and in ghosts; split, where the values of
+    ghost columns begin; driven (v,), bit c is set where component c is driven.
     """
+    (pointers, columns), (own_pointers, other_pointers, split, driven) = graph, places
     for i in range(pointers.size - 1):
         own = own_pointers[i + 1] - own_pointers[i]
         for k in range(pointers[i], pointers[i + 1]):

@@ -8,11 +8,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 
 from ancf_petsc.algebra.envelope import solve_one
 from ancf_petsc.jit import kernel
 from ancf_petsc.kernel.motion import out_of_balance
-from ancf_petsc.material.tensor import inlined
 
 DONE, WANTS_FACTOR, FAILED = range(3)
 
@@ -56,7 +56,7 @@ class Progress(NamedTuple):
     waiting: bool
 
 
-@inlined
+@register_jitable
 def begin(scheme, v, a, d, still):
     """First guess of d, and what of M's factor does not depend on it."""
     h, am, af, beta, gamma, damping = scheme
@@ -68,7 +68,7 @@ def begin(scheme, v, a, d, still):
             still[i, c] = of_v * v[i, c] + of_a * a[i, c]
 
 
-@inlined
+@register_jitable
 def finish(scheme, x, v, a, d):
     """State at the end of the step."""
     h, _, _, beta, gamma, _ = scheme
@@ -80,7 +80,7 @@ def finish(scheme, x, v, a, d):
             x[i, c] += d[i, c]
 
 
-@inlined
+@register_jitable
 def add_to(x, factor, y):
     """x + factor y in x, fields (n, 3)."""
     for i in range(x.shape[0]):
@@ -88,7 +88,7 @@ def add_to(x, factor, y):
             x[i, c] += factor * y[i, c]
 
 
-@inlined
+@register_jitable
 def norm(x):
     """Of a field (n, 3)."""
     total = 0.0
@@ -98,14 +98,15 @@ def norm(x):
     return np.sqrt(total)
 
 
-@inlined
+@register_jitable
 def evaluate(x, d, rules, loads, system):
     """The balance of the step in the buffer of values (n, 3), 0 where driven. Returns its norm and that of the forces."""
     (h, am, af, beta, gamma, damping), _, _, (carried, still, values) = rules
     share = system[2][3]
     inertia = am / (beta * h * h) + damping * af * gamma / (beta * h)
-    carried[:] = still
-    add_to(carried, inertia, d)
+    for i in range(d.shape[0]):
+        for c in range(3):
+            carried[i, c] = still[i, c] + inertia * d[i, c]
     scale = np.sqrt(out_of_balance((x, d, carried), af, loads, system, values)) / af
     for i in range(d.shape[0]):
         for c in range(3):
@@ -113,7 +114,7 @@ def evaluate(x, d, rules, loads, system):
     return norm(values), scale
 
 
-@inlined
+@register_jitable
 def newton(fields, begun, rules, loads, system):
     """Iterations on d until it balances or a factor is wanted. fields: x, d. begun: iterations, last norm, aged, waiting.
 

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 from numba import typeof, types
 
-from ancf_petsc.jit import address_of, composed, kernel
+from ancf_petsc.jit import address_of, kernel
 from ancf_petsc.kernel.interface import Kernel, Means, Span, Target
 from ancf_petsc.material.tensor import inlined
 
@@ -46,49 +46,39 @@ class Action(NamedTuple):
     start: float = 0.0
 
 
-def loop(gather: Gather, action: Action) -> Callable:
-    """The loop of one kernel, to be compiled into others."""
-    states_of, enter, points, place = gather
-    point, sums_of, close, _, start = action
+def loop(gather: Gather, action: Action, named_cells: Callable) -> Callable:
+    """The loop of one kernel, to be compiled; see `interface` for its arguments.
 
-    @composed
-    def visit(fields, cells, parameters, span, out):
-        seen = start
+    It takes plain tuples and gives them their names: checking named ones at the border to compiled code takes microseconds a call.
+    """
+    states_of, enter, points, place = gather
+    point, sums_of, close, named_out, start = action
+
+    def visit(fields, bare_cells, parameters, span, bare_out):
+        cells, out, seen = named_cells(bare_cells), named_out(bare_out), start
         states, sums = states_of(fields, cells), sums_of(cells, out)
-        for e in range(span.first, span.last):
+        for e in range(span[0], span[1]):
             frame = enter(e, fields, cells, states)
             for q in range(points(cells)):
                 seen = point(place(frame, cells, q), states, parameters, sums, seen)
             close(frame, cells, parameters, sums, out)
         return seen
 
+    visit.__name__ = point.__name__  # which names the machine code
     return visit
 
 
 def compiled(gather: Gather, action: Action, named_cells: Callable) -> Kernel:
-    """The compiled loop of one kernel; see `interface` for its arguments.
-
-    Plain tuples cross the border to compiled code: checking named ones there takes microseconds a call.
-    """
-    visit, named_out = loop(gather, action), action.named
-
-    def of_plain_tuples(fields, cells, parameters, span, out):
-        return visit(fields, named_cells(cells), parameters, Span(*span), named_out(out))
-
-    of_plain_tuples.__name__ = action.point.__name__  # which names the machine code
-    return _taking_named_tuples(kernel(of_plain_tuples))
+    """The kernel of a loop."""
+    return _taking_named_tuples(kernel(loop(gather, action, named_cells)))
 
 
-def force_of_all(gather: Gather, action: Action, named_cells: Callable, cells: tuple) -> int:
-    """Address of a loop over all cells, force_of_all(x, cells, parameters, out), for cells of these types; see `jit.call_at`."""
-    visit = loop(gather, action)
-
-    def force_of_all(x, cells, parameters, out):
-        named = named_cells(cells)
-        return visit((x,), named, parameters, Span(0, named.volumes.size), out)
-
+def force_loop(gather: Gather, action: Action, named_cells: Callable, cells: tuple) -> int:
+    """Address of a loop that adds to a force, for one field and cells of these types; see `jit.call_at`."""
     vector, field = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C")
-    return address_of(force_of_all, types.float64(field, typeof(tuple(cells)), vector, field))
+    span, fields = types.UniTuple(types.int64, 2), types.UniTuple(field, 1)
+    signature = types.float64(fields, typeof(tuple(cells)), vector, span, field)
+    return address_of(loop(gather, action, named_cells), signature)
 
 
 def _taking_named_tuples(compiled_loop: Callable) -> Kernel:

@@ -14,44 +14,45 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 
 from ancf_petsc.algebra.envelope import solve_components
 from ancf_petsc.jit import call_at, kernel
-from ancf_petsc.material.tensor import inlined
 
 
 class System(NamedTuple):
     """What a motion needs beside its state and loads. Compiled loops take a plain tuple, which is quicker to call with.
 
-    body: address of the force of all cells (`loop.force_of_all`), cells, parameters of the law.
+    body: address of the force (`loop.force_loop`), and what it takes: cells, parameters of the law, span.
     mass: starts (n+1,), factors (k, size), which (3,) of the consistent mass (`envelope`): component c is solved for by factor
     which[c], no factors with lumped mass; share (n, 3): 1 / mass of free components, 0 of driven ones, inverse of a lumped mass.
     graph: pointers, columns, values of the mass, one number for a pair of nodes.
     buffers: force (n, 3) and work (3, n), overwritten.
     """
 
-    body: tuple[int, tuple, Any]
+    body: tuple[int, tuple, Any, tuple[int, int]]
     damping: float
     mass: tuple
     graph: tuple
     buffers: tuple
 
 
-@inlined
+@register_jitable
 def balance(x, factors, patterns, system):
     """Loads less internal forces into the buffer of forces (n, 3), which is returned."""
-    body, _, _, _, buffers = system
-    address, cells, parameters = body
-    force = buffers[0]
-    force[:] = 0.0
-    call_at(address, x, cells, parameters, force)
+    address, cells, parameters, span = system[0]
+    force = system[4][0]
+    for i in range(force.shape[0]):
+        for c in range(3):
+            force[i, c] = 0.0
+    call_at(address, (x,), cells, parameters, span, force)
     for i in range(force.shape[0]):
         for c in range(3):
             force[i, c] = load(factors, patterns, i, c) - force[i, c]
     return force
 
 
-@inlined
+@register_jitable
 def load(factors, patterns, i, c):
     """Sum of all loads on one component."""
     total = 0.0
@@ -60,11 +61,11 @@ def load(factors, patterns, i, c):
     return total
 
 
-@inlined
+@register_jitable
 def solve_mass(system, a):
     """Accelerations (n, 3) of the forces in the buffer."""
-    _, _, mass, _, (force, work) = system
-    starts, factors, which, share = mass
+    starts, factors, which, share = system[2]
+    force, work = system[4]
     if factors.shape[0]:
         solve_components(starts, factors, which, force, work, a)
         return
@@ -73,7 +74,7 @@ def solve_mass(system, a):
             a[i, c] = share[i, c] * force[i, c]
 
 
-@inlined
+@register_jitable
 def rates_at(y, loads, system, f):
     """f = dy/dt of y = (x, v), both (2, n, 3): velocities and accelerations, 0 where driven."""
     damping = system[1]
@@ -94,7 +95,7 @@ def rates(y, loads, system, f):
 # --- the central difference
 
 
-@inlined
+@register_jitable
 def drift(x, v, a, h):
     """Velocities at the middle of a step, positions at its end."""
     for i in range(x.shape[0]):
@@ -103,7 +104,7 @@ def drift(x, v, a, h):
             x[i, c] += h * v[i, c]
 
 
-@inlined
+@register_jitable
 def kick(v, a, h, damping):
     """Velocities at the end of a step from undamped accelerations, which become the damped ones."""
     for i in range(v.shape[0]):
@@ -112,18 +113,19 @@ def kick(v, a, h, damping):
             a[i, c] -= damping * v[i, c]
 
 
-@inlined
-def power(factors, patterns, v):
-    """Of the loads at velocities v."""
+@register_jitable
+def power(factors, step, patterns, v):
+    """Of the loads in the middle of a step at velocities v."""
     total = 0.0
-    for k in range(factors.size):
+    for k in range(factors.shape[1]):
+        factor = (factors[step, k] + factors[step + 1, k]) / 2
         for i in range(v.shape[0]):
             for c in range(3):
-                total += factors[k] * patterns[k, i, c] * v[i, c]
+                total += factor * patterns[k, i, c] * v[i, c]
     return total
 
 
-@inlined
+@register_jitable
 def row_times(first, last, columns, values, v):
     """One row of M v: entries first to last."""
     x = y = z = 0.0
@@ -135,7 +137,7 @@ def row_times(first, last, columns, values, v):
     return x, y, z
 
 
-@inlined
+@register_jitable
 def kinetic_square(graph, v):
     """v . M v."""
     pointers, columns, values = graph
@@ -154,11 +156,11 @@ def march(state, h, loads, system):
     """
     x, v, a = state
     factors, patterns = loads
-    _, damping, _, graph, _ = system
+    damping, graph = system[1], system[3]
     done = loss = 0.0
     for step in range(factors.shape[0] - 1):
         drift(x, v, a, h)
-        done += h * power((factors[step] + factors[step + 1]) / 2, patterns, v)
+        done += h * power(factors, step, patterns, v)
         if damping != 0.0:
             loss += h * damping * kinetic_square(graph, v)
         balance(x, factors[step + 1], patterns, system)
@@ -170,7 +172,7 @@ def march(state, h, loads, system):
 # --- the balance of an implicit step
 
 
-@inlined
+@register_jitable
 def out_of_balance(fields, part, loads, system, values):
     """values (n, 3): M carried + Q(x + part d) - Q_e. fields: x, d, carried. Returns the sum of the squares of the three."""
     x, d, carried = fields

@@ -19,7 +19,7 @@ from ancf_petsc.element.element import Element
 from ancf_petsc.kernel import motion
 from ancf_petsc.kernel.adaptive import leap
 from ancf_petsc.kernel.choice import kernel_set
-from ancf_petsc.kernel.constant import add_mass, add_mass_blocks, mass_product
+from ancf_petsc.kernel.constant import MassCells, add_mass, add_mass_blocks, mass_product
 from ancf_petsc.kernel.explicit import EXPLICIT
 from ancf_petsc.kernel.implicit import Scheme, Test, alpha_steps
 from ancf_petsc.kernel.interface import Means, Span, Target
@@ -74,7 +74,7 @@ def law_calls(element: Element, law: Law, *, mean: bool = False, moving: bool = 
         yield Call(kernels.mean_force, ((before, after), *rest, force))
         yield Call(kernels.mean_tangent, ((before, after), *rest, matrix))
     if moving and chosen.force_of_all is not None:
-        body = (chosen.force_of_all(law, tables), tuple(tables), p)
+        body = (chosen.force_of_all(law, tables), tuple(tables), p, (0, 1))
         yield from _motion_calls(body, before, graph)
 
 
@@ -101,12 +101,11 @@ def _mass_calls(element: Element, cells: NDArray, graph: tuple, matrix: tuple) -
     maps, slot = np.tile(np.eye(3), (1, nodes_with_slopes(element), 1, 1)), element.slot.astype(np.int32)
     mass, shape_mass = np.zeros(len(columns)), deformed(np.eye(n), 3)
     for lumped in (True, False):
-        yield Call(
-            add_mass, (cells, np.ones(1), shape_mass, slot, maps, lumped, 0, 1, pointers, columns, mass)
-        )
+        mass_cells = MassCells(cells, np.ones(1), shape_mass, slot, maps)
+        yield Call(add_mass, (mass_cells, lumped, Span(0, 1), graph, mass))
     yield Call(mass_product, (pointers, columns, mass, deformed(np.zeros((n, 3)), 4), np.empty((n, 3))))
     none = np.zeros_like(pointers)
-    yield Call(add_mass_blocks, (pointers, columns, mass, 2.0, pointers, none, 9 * n * n, driven, values))
+    yield Call(add_mass_blocks, (graph, mass, 2.0, (pointers, none, 9 * n * n, driven), values))
 
 
 def _block_calls(graph: tuple[NDArray, NDArray]) -> Iterator[Call]:

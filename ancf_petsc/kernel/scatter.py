@@ -84,7 +84,9 @@ def gather_slopes(field, nodes, slot, J, local):
 
 @inlined
 def frame_of(e, cells):
-    inverse, base = nine(cells.inverses[e].ravel()), nine(cells.base)
+    m, base = cells.inverses, nine(cells.base)
+    first, second = (m[e, 0, 0], m[e, 0, 1], m[e, 0, 2]), (m[e, 1, 0], m[e, 1, 1], m[e, 1, 2])
+    inverse = (*first, *second, m[e, 2, 0], m[e, 2, 1], m[e, 2, 2])
     return Frame(e, cells.nodes[e], cells.slot, cells.jacobians[e], inverse, base, cells.volumes[e])
 
 

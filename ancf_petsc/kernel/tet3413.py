@@ -276,7 +276,7 @@ def make_kernels(law: Law) -> Kernels:
 
 def force_of_all(law: Law, cells: tuple) -> int:
     """Address of the internal forces of all cells, for compiled motions."""
-    return loop.force_of_all(GEOMETRY, force_action(law, SOLID), named_cells, cells)
+    return loop.force_loop(GEOMETRY, force_action(law, SOLID), named_cells, cells)
 
 
 @kernel

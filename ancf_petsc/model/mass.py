@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.element.element import Element
-from ancf_petsc.kernel.constant import add_mass, mass_product
+from ancf_petsc.kernel.constant import MassCells, add_mass, mass_product
 from ancf_petsc.kernel.tables import map_functions
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.matrix import Matrix
@@ -40,19 +40,8 @@ class Mass:
         self.values = np.zeros(len(columns))
         for region in model.regions:
             cell_mass = (region.density or 0.0) * model.volumes
-            add_mass(
-                model.cells,
-                cell_mass,
-                self._shape,
-                self._slot,
-                model.slope_maps,
-                lumped,
-                region.first,
-                region.last,
-                pointers,
-                columns,
-                self.values,
-            )
+            cells = MassCells(model.cells, cell_mass, self._shape, self._slot, model.slope_maps)
+            add_mass(cells, lumped, region.cells, (pointers, columns), self.values)
         rows = np.repeat(np.arange(model.owned), np.diff(pointers))
         self.diagonal = self.values[columns == rows]
         self._field = np.zeros_like(model.reference)

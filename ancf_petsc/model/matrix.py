@@ -101,8 +101,8 @@ class Matrix:
     def add_mass(self, mass: NDArray, factor: float) -> None:
         """Add factor times a mass, one number per entry of the layout's graph; driven degrees of freedom get none."""
         rows = self.layout.rows
-        pointers = (rows.own_pointers, rows.other_pointers, rows.split)
-        add_mass_blocks(*self.layout.graph, mass, factor, *pointers, self.layout.driven_bits, self.values)
+        places = (rows.own_pointers, rows.other_pointers, rows.split, self.layout.driven_bits)
+        add_mass_blocks(self.layout.graph, mass, factor, places, self.values)
 
     def add_diagonal(self, diagonal: NDArray) -> None:
         """Add numbers (3 n,) to the diagonal of the owned degrees of freedom."""

@@ -55,7 +55,7 @@ class CompiledMotion:
         self._patterns = np.array([load.pattern for load in model.loads]).reshape(-1, n, 3)
         self._system = tuple(
             System(
-                body=(force_of_all(region.law, cells), cells, region.parameters),
+                body=(force_of_all(region.law, cells), cells, region.parameters, (region.first, region.last)),
                 damping=float(equations.damping),
                 mass=tuple(equations.solver.factors()),
                 graph=(*assembly.graph, mass.values),
