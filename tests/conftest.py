@@ -21,15 +21,6 @@ settings.load_profile("project")
 
 
 MACHINE_CODE = "machine_code"  # in pytest's cache folder
-FILL = """
-import sys
-from ancf_petsc.element.catalog import element
-from ancf_petsc.jit import CACHE_FOLDER
-from ancf_petsc.kernel.warmup import compile_kernels
-from ancf_petsc.material.models import LAWS
-for code in ("3413", "3-10-1-3", "1222"):
-    compile_kernels(element(code), [LAWS[law] for law in sys.argv[1:]], mean=True, moving=True)
-"""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -43,11 +34,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def fill(folder: Path) -> None:
-    """Compile all kernels, each law in a process of its own; what earlier versions left goes.
-
-    A process before them compiles what depends on no law. The two then compile as many functions as each other, so that numba gives
-    functions of both laws the same numbers: names alone must tell them apart.
-    """
+    """Compile all kernels, each law in a process of its own; what earlier versions left goes."""
     from ancf_petsc.jit import source_hash
 
     present = folder / "ancf_petsc" / f"kernels-{source_hash()}"
@@ -56,8 +43,7 @@ def fill(folder: Path) -> None:
         return
     shutil.rmtree(folder / "ancf_petsc", ignore_errors=True)
     environment = os.environ | {"ANCF_CACHE_DIR": str(folder)}
-    command = [sys.executable, "-c", FILL]
-    subprocess.run(command, env=environment, check=True)
+    command = [sys.executable, str(PROJECT / "scripts" / "verify_machine_code"), "--fill"]
     processes = [subprocess.Popen([*command, law], env=environment) for law in ("svk", "neo_hooke")]
     assert [process.wait() for process in processes] == [0, 0]
     mark.touch()
