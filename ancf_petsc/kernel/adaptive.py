@@ -12,19 +12,20 @@ from numba.extending import register_jitable
 
 from ancf_petsc.jit import kernel
 from ancf_petsc.kernel.motion import rates_at
+from ancf_petsc.material.tensor import inlined
 
 SAFETY, AGAIN, SHORTER, LONGER = 0.9, 0.5, 0.1, 10.0
 REACHED, MORE, TOO_SHORT, NOT_FINITE = range(4)
 
 
-@register_jitable
+@inlined
 def copy(given, into):
     """Of a flat array."""
     for m in range(given.size):
         into[m] = given[m]
 
 
-@register_jitable
+@inlined
 def combine(y, h, weights, stages, trial):
     """trial = y + h sum of weights times stages, all flat."""
     copy(y, trial)
@@ -35,7 +36,7 @@ def combine(y, h, weights, stages, trial):
                 trial[m] += factor * stage[m]
 
 
-@register_jitable
+@inlined
 def error_of(h, difference, stages, position, speed):
     """Root mean square of the difference of the two orders over the tolerances of positions and velocities."""
     half, total = stages.shape[1] // 2, 0.0
@@ -50,7 +51,7 @@ def error_of(h, difference, stages, position, speed):
     return h * np.sqrt(total / stages.shape[1])
 
 
-@register_jitable
+@inlined
 def largest(v):
     """Largest magnitude of a component of a field (n, 3)."""
     top = 0.0
@@ -74,7 +75,7 @@ def loss_of(graph, v, a):
     return loss, rate
 
 
-@register_jitable
+@inlined
 def size_of(left, proposed):
     """Of the next step: two equal ones rather than one and a tiny rest."""
     size = min(left, proposed)
@@ -94,7 +95,7 @@ def attempt(y, h, method, given, into):
         combine(y.reshape(-1), h, weights, flat, trial.reshape(-1))
 
 
-@register_jitable
+@inlined
 def next_size(h, error, order, again):
     """What the control proposes after a step h with this error. again: whether the one before it failed."""
     safety = SAFETY * AGAIN if again and error > 1.0 else SAFETY

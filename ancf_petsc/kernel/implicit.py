@@ -13,6 +13,7 @@ from numba.extending import register_jitable
 from ancf_petsc.algebra.envelope import solve_one
 from ancf_petsc.jit import kernel
 from ancf_petsc.kernel.motion import out_of_balance
+from ancf_petsc.material.tensor import inlined
 
 DONE, WANTS_FACTOR, FAILED = range(3)
 
@@ -56,7 +57,7 @@ class Progress(NamedTuple):
     waiting: bool
 
 
-@register_jitable
+@inlined
 def begin(scheme, v, a, d, still):
     """First guess of d, and what of M's factor does not depend on it."""
     h, am, af, beta, gamma, damping = scheme
@@ -68,7 +69,7 @@ def begin(scheme, v, a, d, still):
             still[i, c] = of_v * v[i, c] + of_a * a[i, c]
 
 
-@register_jitable
+@inlined
 def finish(scheme, x, v, a, d):
     """State at the end of the step."""
     h, _, _, beta, gamma, _ = scheme
@@ -80,7 +81,7 @@ def finish(scheme, x, v, a, d):
             x[i, c] += d[i, c]
 
 
-@register_jitable
+@inlined
 def add_to(x, factor, y):
     """x + factor y in x, fields (n, 3)."""
     for i in range(x.shape[0]):
@@ -88,7 +89,7 @@ def add_to(x, factor, y):
             x[i, c] += factor * y[i, c]
 
 
-@register_jitable
+@inlined
 def norm(x):
     """Of a field (n, 3)."""
     total = 0.0

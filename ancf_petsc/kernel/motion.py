@@ -18,6 +18,7 @@ from numba.extending import register_jitable
 
 from ancf_petsc.algebra.envelope import solve_components
 from ancf_petsc.jit import call_at, kernel
+from ancf_petsc.material.tensor import inlined
 
 
 class System(NamedTuple):
@@ -37,7 +38,7 @@ class System(NamedTuple):
     buffers: tuple
 
 
-@register_jitable
+@inlined
 def balance(x, factors, patterns, system):
     """Loads less internal forces into the buffer of forces (n, 3), which is returned."""
     address, cells, parameters, span = system[0]
@@ -52,7 +53,7 @@ def balance(x, factors, patterns, system):
     return force
 
 
-@register_jitable
+@inlined
 def load(factors, patterns, i, c):
     """Sum of all loads on one component."""
     total = 0.0
@@ -61,7 +62,7 @@ def load(factors, patterns, i, c):
     return total
 
 
-@register_jitable
+@inlined
 def solve_mass(system, a):
     """Accelerations (n, 3) of the forces in the buffer."""
     starts, factors, which, share = system[2]
@@ -95,7 +96,7 @@ def rates(y, loads, system, f):
 # --- the central difference
 
 
-@register_jitable
+@inlined
 def drift(x, v, a, h):
     """Velocities at the middle of a step, positions at its end."""
     for i in range(x.shape[0]):
@@ -104,7 +105,7 @@ def drift(x, v, a, h):
             x[i, c] += h * v[i, c]
 
 
-@register_jitable
+@inlined
 def kick(v, a, h, damping):
     """Velocities at the end of a step from undamped accelerations, which become the damped ones."""
     for i in range(v.shape[0]):
@@ -113,7 +114,7 @@ def kick(v, a, h, damping):
             a[i, c] -= damping * v[i, c]
 
 
-@register_jitable
+@inlined
 def power(factors, step, patterns, v):
     """Of the loads in the middle of a step at velocities v."""
     total = 0.0
@@ -125,7 +126,7 @@ def power(factors, step, patterns, v):
     return total
 
 
-@register_jitable
+@inlined
 def row_times(first, last, columns, values, v):
     """One row of M v: entries first to last."""
     x = y = z = 0.0
@@ -137,7 +138,7 @@ def row_times(first, last, columns, values, v):
     return x, y, z
 
 
-@register_jitable
+@inlined
 def kinetic_square(graph, v):
     """v . M v."""
     pointers, columns, values = graph

@@ -282,9 +282,13 @@ def _made(gather, action):
     return compiled(gather, action, scatter.named_cells)
 
 
-@cache
 def make_kernels(law: object) -> Kernels:
     """Kernels of beams; they are linearly elastic whatever the law."""
+    return _kernels()
+
+
+@cache
+def _kernels() -> Kernels:
     forces = (scatter.force_sums, scatter.give_force, as_given)
     products = (scatter.product_sums, scatter.give_force, as_given)
     in_place = (sums_in_place, nothing_to_close)

@@ -59,19 +59,19 @@ def law_calls(element: Element, law: Law, *, mean: bool = False, moving: bool = 
     """
     n, d = element.functions, element.cell.dimension
     cells, reference = np.arange(n, dtype=np.int32).reshape(1, n), one_cell(element)
-    before, after, force = deformed(reference, 1), deformed(reference, 2), np.zeros((n, 3))
+    before, after = deformed(reference, 1), deformed(reference, 2)
     graph, matrix = _matrix(cells)
     chosen = kernel_set(element)
     tables = chosen.cells(element, cells, reference, axes=np.eye(3)[:, :d])
     kernels, p = chosen.kernels(law), law.parameters(1.0, 0.3)
     rest = (tables, p, Span(0, 1))
-    yield Call(kernels.internal_force, ((before,), *rest, force))
+    yield Call(kernels.internal_force, ((before,), *rest, np.zeros((n, 3))))
     yield Call(kernels.energy, ((before,), *rest))
     yield Call(kernels.tangent, ((before,), *rest, matrix))
-    yield Call(kernels.tangent_product, ((before, after), *rest, force))
+    yield Call(kernels.tangent_product, ((before, after), *rest, np.zeros((n, 3))))
     yield Call(kernels.fields, ((before,), *rest, Means(np.empty((1, 9)), np.empty((1, 9)), np.empty(1))))
     if mean and kernels.mean_force is not None and kernels.mean_tangent is not None:
-        yield Call(kernels.mean_force, ((before, after), *rest, force))
+        yield Call(kernels.mean_force, ((before, after), *rest, np.zeros((n, 3))))
         yield Call(kernels.mean_tangent, ((before, after), *rest, matrix))
     if moving and chosen.force_of_all is not None:
         body = (chosen.force_of_all(law, tables), tuple(tables), p, (0, 1))
