@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ancf_petsc.element.element import Element
@@ -86,7 +88,7 @@ def _with_new_nodes(mesh: Mesh, group: Group, corners: Integers, new: Integers) 
             else np.empty((0, corners.shape[1]), np.int64)
         )
         candidates = candidates[rows_in(corners[candidates], known, bound) >= 0]
-    return Group(group.name, np.concatenate((group.nodes, new[candidates])), group.parts)
+    return replace(group, nodes=np.concatenate((group.nodes, new[candidates])))
 
 
 def _faces_of(parts: Integers, dimension: int, corners: int) -> Integers:

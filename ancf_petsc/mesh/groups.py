@@ -232,7 +232,9 @@ def measure(mesh: Mesh, dimension: int, parts: Integers) -> float:
 
 
 def cells_of(mesh: Mesh, group: Group) -> Integers:
-    """Ascending indices of the cells that are the group's parts, else of those with all nodes in it."""
+    """Ascending indices of the cells the name stands for, else that are the group's parts, else with all nodes in it."""
+    if group.cells is not None:
+        return group.cells
     own = group.parts.get(_dimension(mesh))
     if own is None:
         return np.flatnonzero(_belongs(mesh, group.nodes)[mesh.cells].all(axis=1))

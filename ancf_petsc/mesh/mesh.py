@@ -18,11 +18,13 @@ class Group:
     nodes: (k,) ascending indices of points, mid-nodes of quadratic parts included.
     parts: dimension (0 point, 1 line, 2 face, 3 volume) -> (m, corners) indices of points, each part
         once. Empty for a group that is only a set of nodes.
+    cells: (m,) indices of the cells the name stands for where a material is given to it, if those are not its parts.
     """
 
     name: str
     nodes: Integers
     parts: dict[int, Integers] = field(default_factory=dict)
+    cells: Integers | None = None
 
 
 @dataclass

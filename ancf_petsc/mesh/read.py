@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from ancf_petsc.mesh.abaqus import read_abaqus
 from ancf_petsc.mesh.assemble import assemble
 from ancf_petsc.mesh.gmsh_file import read_gmsh
 from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.mesh.meshio_file import read_meshio
 from ancf_petsc.mesh.msh_text import read_ordinary
-from ancf_petsc.mesh.raw import mesh_error
+from ancf_petsc.mesh.raw import RawMesh, mesh_error
 
 
 def read_mesh(
@@ -26,9 +27,17 @@ def read_mesh(
     """
     path = Path(path)
     _require_file(path)
-    by_gmsh = path.suffix.lower() == ".msh" and not _is_ansys(path)
-    raw = (read_ordinary(path) or read_gmsh(path)) if by_gmsh else read_meshio(path)
-    return assemble(raw, path, kinds, duplicates, element)
+    return assemble(_raw(path), path, kinds, duplicates, element)
+
+
+def _raw(path: Path) -> RawMesh:
+    """What the reader for the kind of file finds in it."""
+    suffix = path.suffix.lower()
+    if suffix == ".msh" and not _is_ansys(path):
+        return read_ordinary(path) or read_gmsh(path)
+    if suffix == ".inp":
+        return read_abaqus(path)
+    return read_meshio(path)
 
 
 def _require_file(path: Path) -> None:
