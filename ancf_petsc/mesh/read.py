@@ -11,6 +11,7 @@ from ancf_petsc.mesh.gmsh_file import read_gmsh
 from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.mesh.meshio_file import read_meshio
 from ancf_petsc.mesh.msh_text import read_ordinary
+from ancf_petsc.mesh.nastran import read_nastran
 from ancf_petsc.mesh.raw import RawMesh, mesh_error
 
 
@@ -37,6 +38,8 @@ def _raw(path: Path) -> RawMesh:
         return read_ordinary(path) or read_gmsh(path)
     if suffix == ".inp":
         return read_abaqus(path)
+    if suffix in (".bdf", ".nas", ".fem"):
+        return read_nastran(path)
     return read_meshio(path)
 
 
