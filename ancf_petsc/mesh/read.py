@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ancf_petsc.mesh.abaqus import read_abaqus
 from ancf_petsc.mesh.assemble import assemble
+from ancf_petsc.mesh.exodus import read_exodus
 from ancf_petsc.mesh.gmsh_file import read_gmsh
 from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.mesh.meshio_file import read_meshio
@@ -40,6 +41,8 @@ def _raw(path: Path) -> RawMesh:
         return read_abaqus(path)
     if suffix in (".bdf", ".nas", ".fem"):
         return read_nastran(path)
+    if suffix in (".e", ".exo", ".ex2", ".exii"):
+        return read_exodus(path)
     return read_meshio(path)
 
 

@@ -79,7 +79,7 @@ class _Groups:
                 if rows.any() and elements.type.shape:
                     self.raw.blocks.append(self._block(elements, rows, key, tuple(names)))
 
-    def _block(self, elements: Elements, rows: Integers, key: str, names: tuple[str, ...]) -> Block:
+    def _block(self, elements: Elements, rows: np.ndarray, key: str, names: tuple[str, ...]) -> Block:
         assert elements.type.shape
         nodes, order = elements.nodes[rows] + self.offsets["node"][key], elements.type.shape.order
         numbers = elements.numbers[rows] + self.offsets["element"][key]
@@ -190,7 +190,7 @@ def _named(scope: Scope) -> Iterator[tuple[str, str, str]]:
 
 
 def _sides(
-    surface: Surface, line: SurfaceLine, elements: Elements, rows: Integers, free: dict[int, Integers] | None
+    surface: Surface, line: SurfaceLine, elements: Elements, rows: np.ndarray, free: dict[int, Integers] | None
 ) -> Iterator[Integers]:
     """Corners (m, c) of the faces a line names of some elements of a card, as numbers of the deck."""
     assert elements.type.shape

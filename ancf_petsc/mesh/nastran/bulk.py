@@ -142,7 +142,7 @@ def _cards(lines: Iterable[Line]) -> Iterator[Card]:
                 raise line.error(
                     f"continuation {head} follows one that expects +{marker}", cure="write the deck in order"
                 )
-            _fill(card, wide)
+            _fill(card, wide=wide)
             card.fields += fields[1:]
         else:
             if card:
@@ -158,7 +158,7 @@ def _cards(lines: Iterable[Line]) -> Iterator[Card]:
         yield card
 
 
-def _fill(card: Card, wide: bool) -> None:
+def _fill(card: Card, *, wide: bool) -> None:
     """Empty fields, so that a continuation begins where its line does: every 4 of large fields, every 8 of small ones."""
     width = 4 if wide else 8
     card.fields += [""] * (-(len(card.fields) - 1) % width)
@@ -188,7 +188,7 @@ def _split(line: Line) -> tuple[list[str], str, bool]:
         data = [text[at : at + step].strip() for at in range(8, 72, step)]
         marker = text[72:80].strip()
     for field in data:
-        if field.startswith("=") or field.startswith("*("):
+        if field.startswith(("=", "*(")):
             raise line.error("replicated fields are not read", got=field, cure="write every card in full")
     while data and not data[-1]:
         data.pop()
