@@ -11,6 +11,7 @@ from ancf_petsc.mesh.exodus import read_exodus
 from ancf_petsc.mesh.gmsh_file import read_gmsh
 from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.mesh.meshio_file import read_meshio
+from ancf_petsc.mesh.msh_binary import read_binary
 from ancf_petsc.mesh.msh_text import read_ordinary
 from ancf_petsc.mesh.nastran import read_nastran
 from ancf_petsc.mesh.raw import RawMesh, mesh_error
@@ -36,7 +37,7 @@ def _raw(path: Path) -> RawMesh:
     """What the reader for the kind of file finds in it."""
     suffix = path.suffix.lower()
     if suffix == ".msh" and not _is_ansys(path):
-        return read_ordinary(path) or read_gmsh(path)
+        return read_ordinary(path) or read_binary(path) or read_gmsh(path)
     if suffix == ".inp":
         return read_abaqus(path)
     if suffix in (".bdf", ".nas", ".fem"):
@@ -48,6 +49,8 @@ def _raw(path: Path) -> RawMesh:
 
 def _require_file(path: Path) -> None:
     wrong = mesh_error(path)
+    if "\0" in str(path):
+        raise wrong("a path cannot hold a zero byte", cure="mend mesh.file")
     if not path.exists():
         raise wrong("there is no such file", cure="give the path of the mesh from the case file's folder")
     if not path.is_file():

@@ -50,3 +50,13 @@ def note_latin(text: str, at: int, notes: list[str]) -> None:
     start = text.rfind("\n", 0, at) + 1
     end = text.find("\n", at)
     notes.append(LATIN.format(text[start : len(text) if end < 0 else end].strip()[:60]))
+
+
+def decoded(data: bytes, notes: list[str]) -> str:
+    """Names of a file, all in one encoding, so that different ones stay different."""
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        text = data.decode("latin-1")
+        note_latin(text, error.start, notes)
+        return text

@@ -190,7 +190,11 @@ def _named(scope: Scope) -> Iterator[tuple[str, str, str]]:
 
 
 def _sides(
-    surface: Surface, line: SurfaceLine, elements: Elements, rows: np.ndarray, free: dict[int, Integers] | None
+    surface: Surface,
+    line: SurfaceLine,
+    elements: Elements,
+    rows: np.ndarray,
+    free: dict[int, Integers] | None,
 ) -> Iterator[Integers]:
     """Corners (m, c) of the faces a line names of some elements of a card, as numbers of the deck."""
     assert elements.type.shape
