@@ -276,6 +276,8 @@ def _build_groups(
         nodes = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *rows[name]]))
         own = {d: unique_rows(np.concatenate(found), bound) for d, found in sorted(parts[name].items())}
         own = {dimension: found for dimension, found in own.items() if len(found)}
+        if set(own) == {0} and len(nodes) > 1:  # several points are a set of nodes, which may cover faces
+            own = {}
         mesh.groups[name] = Group(name, nodes, own, apart.get(name))
 
 
