@@ -8,6 +8,7 @@ import numpy as np
 
 from ancf_petsc.errors import MeshError
 from ancf_petsc.mesh.coincident import TOLERANCE, coincident_pairs, representatives
+from ancf_petsc.mesh.doubts import doubts
 from ancf_petsc.mesh.kinds import KINDS, Kind, determinants, edge_lengths, part_kind
 from ancf_petsc.mesh.mesh import Floats, Group, Integers, Mesh
 from ancf_petsc.mesh.parts import row_keys, unique_rows
@@ -70,6 +71,8 @@ def assemble(raw: RawMesh, path: Path, kinds: tuple[str, ...], duplicates: str, 
     _settle_duplicates(mesh, numbering, duplicates)
     _orient(mesh, kind, path)
     _build_groups(mesh, raw, others, membership, numbering)
+    mesh.refused |= raw.refused
+    mesh.notes += doubts(mesh, raw.boundary_only)
     unused = len(mesh.points) - np.count_nonzero(mesh.used)
     if unused:
         mesh.notes.append(f"{unused} of {len(mesh.points)} nodes belong to no element: kept, in no group")

@@ -80,7 +80,9 @@ def _complete_groups(mesh: Mesh, element: Element) -> None:
     if completed:
         listing = ", ".join(completed[:SHOWN])
         others = f" and {len(completed) - SHOWN} groups more" if len(completed) > SHOWN else ""
-        mesh.notes.append(f"groups that lack the nodes between their corners are completed: {listing} nodes{others}")
+        mesh.notes.append(
+            f"groups that lack the nodes between their corners are completed: {listing} nodes{others}"
+        )
 
 
 def _add_nodes(mesh: Mesh, cells: Integers, places: Integers) -> None:

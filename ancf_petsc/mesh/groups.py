@@ -167,6 +167,8 @@ def _sorted(rows: Integers) -> Integers:
 
 def find_group(mesh: Mesh, name: str, key: str, file: str | Path | None) -> Group:
     """The group of a name; CaseError about `key` where there is none or where it is empty."""
+    if name in mesh.refused:
+        raise CaseError(mesh.refused[name], file=file, key=key, got=name, cure="mend it in the mesh file")
     group = mesh.groups.get(name)
     if group is None:
         raise CaseError(
@@ -222,14 +224,18 @@ def describe_set(mesh: Mesh, group: Group) -> str | None:
     if group.parts or len(group.nodes) < 2:
         return None
     parts = parts_for_support(mesh, group)
-    covered = _belongs(mesh, np.concatenate([np.empty(0, np.int64), *(rows.ravel() for rows in parts.values())]))
+    covered = _belongs(
+        mesh, np.concatenate([np.empty(0, np.int64), *(rows.ravel() for rows in parts.values())])
+    )
     corners = _belongs(mesh, mesh.cells[:, : KINDS[KINDS[mesh.kind].linear or mesh.kind].nodes].ravel())
     loose = np.count_nonzero(corners[group.nodes] & ~covered[group.nodes])
     what = {0: "point", 1: "edge", 2: "face"}
     found = [f"{len(rows)} {what[dimension]}s" for dimension, rows in parts.items()]
     said = f"{group.name}: a set of nodes, taken as the {' and '.join(found)} it covers" if found else ""
     if loose:
-        count = f"{loose} of its {len(group.nodes)} nodes belong to no whole face or edge in it: held as points"
+        count = (
+            f"{loose} of its {len(group.nodes)} nodes belong to no whole face or edge in it: held as points"
+        )
         said = f"{said}; {count}" if said else f"{group.name}: a set of nodes; {count}"
     return said or None
 

@@ -39,6 +39,7 @@ class Mesh:
     used: (n,) whether a cell uses the point.
     boundary: (m, corners) sides of one cell only; `groups.boundary_faces` finds them when first asked.
     notes: what the reader did or noticed, for the log.
+    refused: names of the file that cannot be used as groups -> why.
     """
 
     points: Floats
@@ -51,6 +52,7 @@ class Mesh:
     notes: list[str] = field(default_factory=list)
     source: str = ""
     boundary: Integers | None = field(default=None, repr=False)
+    refused: dict[str, str] = field(default_factory=dict)
 
     @property
     def size(self) -> float:

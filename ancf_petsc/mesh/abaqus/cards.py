@@ -199,7 +199,14 @@ def surface(reader: Reader, card: Card) -> None:
     name = label(card.needed(given, "NAME"))
     kind = label(given.get("TYPE") or "ELEMENT").key
     if kind not in ("ELEMENT", "NODE") or given.get("COMBINE") or "CROP" in given:
-        reader.strange_surfaces.append(name.shown)
+        what = (
+            f"COMBINE={given['COMBINE']}"
+            if given.get("COMBINE")
+            else "CROP"
+            if "CROP" in given
+            else f"TYPE={given['TYPE']}"
+        )
+        reader.refused[name.shown] = f"a surface with {what}, which is not read"
         return
     found = reader.scope.surfaces.setdefault(name.key, Surface(name.shown, card, kind == "NODE"))
     if found.of_nodes != (kind == "NODE"):

@@ -33,7 +33,7 @@ class Reader:
         self.has_assembly = False
         self.used_parts: set[str] = set()
         self.beyond: dict[str, int] = {}
-        self.strange_surfaces: list[str] = []
+        self.refused: dict[str, str] = {}
         self.skipped: dict[str, str] = {}
 
     def take(self, card: Card) -> None:
@@ -74,10 +74,8 @@ def _skipped(reader: Reader) -> list[str]:
     if reader.beyond:
         listing = ", ".join(f"{count} {title}" for title, count in sorted(reader.beyond.items()))
         notes.append(f"elements that are no part of the body are skipped: {listing}")
-    if reader.strange_surfaces:
-        notes.append(
-            f"surfaces that are no faces of elements are skipped: {', '.join(reader.strange_surfaces)}"
-        )
+    if reader.refused:
+        notes.append("; ".join(f"{name}: {why}" for name, why in reader.refused.items()))
     return notes
 
 
@@ -145,7 +143,9 @@ def _raw(model: Model, reader: Reader) -> RawMesh:
         for key, instance in model.instances.items()
         for block in _blocks(instance, key, offsets, model.notes)
     ]
-    raw = RawMesh(np.concatenate(numbers), np.concatenate(points), blocks, notes=model.notes)
+    raw = RawMesh(
+        np.concatenate(numbers), np.concatenate(points), blocks, notes=model.notes, refused=reader.refused
+    )
     name_groups(raw, model, resolver, offsets.by)
     model.notes += offsets.note(model)
     for name, (count, first) in resolver.missing.items():

@@ -101,6 +101,8 @@ class _Groups:
         self.raw.names += own
         if surface.of_nodes:
             self.raw.node_sets.update(dict.fromkeys(own, found))
+        else:
+            self.raw.boundary_only.update(own)
         self.raw.blocks += [Block(block.kind, block.numbers, block.nodes, own) for block in blocks]
 
     def _free_name(self, name: str, nodes: Integers) -> str:
