@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba.extending import register_jitable
 
-from ancf_petsc.kernel.compiled import kernel
+from ancf_petsc.jit import kernel
 from ancf_petsc.mesh.kinds import KINDS
 from ancf_petsc.mesh.mesh import Floats, Integers
 
