@@ -246,15 +246,22 @@ def _build_groups(
     kind = KINDS[mesh.kind]
     rows: dict[str, list[Integers]] = {name: [] for name in raw.names}
     parts: dict[str, dict[int, list[Integers]]] = {name: {} for name in raw.names}
+    dropped: dict[str, int] = {}
     for block in blocks:
         if not block.names:
             continue
         nodes = numbering.of(block)
-        nodes = nodes[mesh.used[nodes].all(axis=1)]
         corners = _corners_of_parts(nodes, block.kind, kind, numbering.path)
+        there = mesh.used[corners].all(axis=1)
+        own = nodes[there].ravel()
         for name in block.names:
-            rows[name].append(nodes.ravel())
-            parts[name].setdefault(KINDS[block.kind].dimension, []).append(corners)
+            rows[name].append(own[mesh.used[own]])
+            parts[name].setdefault(KINDS[block.kind].dimension, []).append(corners[there])
+            if not there.all():
+                dropped[name] = dropped.get(name, 0) + np.count_nonzero(~there)
+    if dropped:
+        listing = ", ".join(f"{count} of {name}" for name, count in dropped.items())
+        mesh.notes.append(f"parts of groups whose corners belong to no element are left out: {listing}")
     for name, numbers in raw.node_sets.items():
         nodes = numbering.find(numbers)
         rows[name].append(nodes[(nodes >= 0) & mesh.used[nodes]])

@@ -47,9 +47,8 @@ def _utf16(data: bytes, path: Path) -> str:
 
 def note_latin(text: str, at: int, notes: list[str]) -> None:
     """Say once that a text is not UTF-8, with the line it is first seen in."""
-    start = text.rfind("\n", 0, at) + 1
-    end = text.find("\n", at)
-    notes.append(LATIN.format(text[start : len(text) if end < 0 else end].strip()[:60]))
+    start = max(text.rfind("\n", 0, at), text.rfind("\r", 0, at)) + 1
+    notes.append(LATIN.format(text[start:].splitlines()[0].strip()[:60]))
 
 
 def decoded(data: bytes, notes: list[str]) -> str:

@@ -176,11 +176,11 @@ class _Deck:
         at = 0
         while at < len(rest):
             found = PARAMETER.match(rest, at)
+            if rest[at] in ", \t":
+                at += 1
+                continue
             if found is None:
-                if rest[at] in ", \t":
-                    at += 1
-                    continue
-                raise card.error("this keyword line is not understood", got=header[:80])
+                raise card.error("this keyword line is not understood", got=header[:80], cure="mend the line")
             card.parameters["".join(found[1].split()).upper()] = (found[2] or "").strip()
             at = max(found.end(), at + 1)
         return card

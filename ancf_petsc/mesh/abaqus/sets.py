@@ -11,7 +11,7 @@ import numpy as np
 from ancf_petsc.errors import did_you_mean
 from ancf_petsc.mesh.abaqus.data import Label
 from ancf_petsc.mesh.abaqus.deck import Card
-from ancf_petsc.mesh.abaqus.scope import ALL, Instance, Listed, Member, Range, Reference, Scope
+from ancf_petsc.mesh.abaqus.scope import Instance, Listed, Member, Range, Reference, Scope
 from ancf_petsc.mesh.mesh import Integers
 
 if TYPE_CHECKING:
@@ -91,8 +91,6 @@ class Resolver:
             )
         if key in owner.sets[kind]:
             numbers = self._set(owner, kind, key, above)
-        elif key == ALL[kind]:
-            numbers = {"": self.existing(owner, kind)}
         else:
             known = [known.shown for known in owner.sets[kind].values()]
             raise member.card.error(
