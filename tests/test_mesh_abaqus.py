@@ -506,7 +506,8 @@ def test_calculix_finds_the_same_sets_in_the_same_deck(tmp_path, seed):
     nodes, elements = (",\n".join(map(str, own)) for own in (BAR.numbers, BAR.elements))
     prints = "".join(f"*NODE PRINT, NSET={name}\nU\n" for name in BAR.sets)
     step = (
-        f"*NSET, NSET=everything\n{nodes}\n*ELSET, ELSET=whole_body\n{elements}\n*MATERIAL, NAME=M\n*ELASTIC\n5e6, 0.4\n*SOLID SECTION, ELSET=whole_body, MATERIAL=M\n*STEP\n*STATIC\n*BOUNDARY\neverything, 1, 3\n"
+        f"*NSET, NSET=everything\n{nodes}\n*ELSET, ELSET=whole_body\n{elements}\n*MATERIAL, NAME=M\n*ELASTIC\n"
+        "5e6, 0.4\n*SOLID SECTION, ELSET=whole_body, MATERIAL=M\n*STEP\n*STATIC\n*BOUNDARY\neverything, 1, 3\n"
         f"{prints}*EL PRINT, ELSET=lower, TOTALS=ONLY\nEVOL\n*EL PRINT, ELSET=whole_body, TOTALS=ONLY\nEVOL\n*END STEP\n"
     )
     (tmp_path / "job.inp").write_text(
