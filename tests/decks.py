@@ -18,6 +18,9 @@ from ancf_petsc.mesh.kinds import KUHN
 FORCE = 8594.0290162641
 """Of the bar stretched by 20 %, E = 5e6, nu = 0.4, neo-Hookean, cross-section 0.1 x 0.1: in closed form for any mesh."""
 
+BAR_KINDS = {"TET4": "tetra", "TETRA": "tetra", "HEX8": "hexahedron", "HEX": "hexahedron"}
+"""Exodus's types of elements."""
+
 
 @dataclass
 class Bar:
@@ -210,6 +213,7 @@ def pulled(
     element: str = "3413",
     stroke: float = 0.04,
     names: Mapping[str, str] | None = None,
+    groups: Mapping[str, Any] | None = None,
     axes: str = "xyz",
 ) -> float:
     """Force at the top of the bar stretched by `stroke`; names: groups by the names of the bar's sets; axes: of the bar."""
@@ -218,6 +222,7 @@ def pulled(
     data = {
         "title": "bar",
         "mesh": {"file": str(mesh), "element": element},
+        "groups": dict(groups or {}),
         "material": {"law": "neo_hooke", "young": 5e6, "poisson": 0.4},
         "constraint": [
             {"group": name["bottom"], "fix": [z]},

@@ -232,7 +232,7 @@ def test_included_files(tmp_path):
 
 WRONG = {
     "no system": ("GRID,1,4,1.,0.,0.", r"line \d+: GRID: there is no coordinate system 4"),
-    "a system by itself": ("GRID,1,4,1.,0.,0.\nCORD2R,4,4,0.,0.,0.,0.,0.,1.\n,1.,0.,0.", "coordinate system 4 is defined by itself"),
+    "a system by itself": ("GRID,1,4,1.,0.,0.\nCORD2R,4,4,0.,0.,0.,0.,0.,1.\n,1.,0.,0.", "system 4 is defined by itself"),
     "points on a line": ("GRID,1,4,1.,0.,0.\nCORD2R,4,,0.,0.,0.,0.,0.,1.\n,0.,0.,2.", "CORD2R: its three points lie on one line"),
     "a system twice": ("CORD2R,4,,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\nCORD1R,4,7,10,13", "coordinate system 4 is given twice"),
     "a word": ("GRID,1,,one,0.,0.", r"line \d+: GRID: field 4 is not a number: found 'one'"),

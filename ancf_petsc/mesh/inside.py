@@ -11,8 +11,8 @@ from ancf_petsc.mesh.mesh import Floats, Integers
 
 MOST_BINS = 128
 """Of the grid the points are sorted into, along an axis."""
-WITHIN = 1e-6
-"""A point is in a cell when its barycentric coordinates there are all larger."""
+WITHIN = -1e-9
+"""A point is in a cell when its barycentric coordinates there are all larger: on a side counts."""
 
 
 def other_cells(points: Floats, kind: str, cells: Integers, places: Floats, owners: Integers) -> Integers:
