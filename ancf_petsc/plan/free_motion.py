@@ -72,7 +72,7 @@ def motion_names(null: NDArray, centre: NDArray, size: float) -> list[str]:
     for mode in (null @ basis[:rank].T).T:
         axis = mode[3:] / np.linalg.norm(mode[3:])
         point = centre + np.cross(axis, mode[:3]) * size / np.linalg.norm(mode[3:])
-        place = ", ".join(f"{c:.6g}" for c in point)
+        place = ", ".join(f"{c:.6g}" for c in np.where(np.abs(point) < 1e-9 * size, 0.0, point))
         names.append(f"rotation about the axis along {_direction(axis)} through ({place})")
     return names
 
