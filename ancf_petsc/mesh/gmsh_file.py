@@ -29,6 +29,9 @@ from ancf_petsc.mesh.text import decoded
 
 CURE = "the file may be truncated or damaged: write it again"
 
+LEAST_PATIENCE, SLOWEST = 60.0, 1e5
+"""Seconds, and bytes a second: damaged counts keep Gmsh busy for ever; it reads whole files a hundred times faster."""
+
 Names = dict[tuple[int, int], str]
 
 
@@ -105,7 +108,13 @@ def _contents(path: Path, *, swapped: bool) -> dict[str, Any]:
     command = [sys.executable, "-P", gmsh_child.__file__, str(path), str(int(swapped))]
     # A Gmsh built with MPI must not take itself for a rank of this run.
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMI", "PMIX_", "MPI_"))}
-    child = subprocess.run(command, capture_output=True, env=environment, stdin=subprocess.DEVNULL)
+    patience = LEAST_PATIENCE + path.stat().st_size / SLOWEST
+    try:
+        child = subprocess.run(
+            command, capture_output=True, env=environment, stdin=subprocess.DEVNULL, timeout=patience
+        )
+    except subprocess.TimeoutExpired:
+        raise mesh_error(path)(f"Gmsh does not come to an end of it in {patience:.0f} s", cure=CURE) from None
     if child.returncode == 0:
         return pickle.loads(child.stdout)
     reason = " ".join(child.stdout.decode("utf-8", "replace").split())

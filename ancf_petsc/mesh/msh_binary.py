@@ -1,4 +1,4 @@
-"""Binary files of Gmsh, version 2: read in this process.
+"""Binary files of Gmsh, versions 2 and 4.1: read in this process.
 
 Gmsh's own reader loses the physical groups of partitioned files and does not know $ParametricNodes as a section of nodes.
 Source: Gmsh reference manual, "MSH file format version 2".
@@ -15,7 +15,8 @@ import numpy as np
 
 from ancf_petsc.mesh.kinds import BY_GMSH
 from ancf_petsc.mesh.mesh import Floats, Integers
-from ancf_petsc.mesh.msh_text import CURE, NotOrdinary, Rows, group_of, physical_names, raw_mesh
+from ancf_petsc.mesh.msh_binary_41 import read_41
+from ancf_petsc.mesh.msh_text import CURE, Names, NotOrdinary, Rows, group_of, physical_names, raw_mesh
 from ancf_petsc.mesh.raw import RawMesh, mesh_error
 from ancf_petsc.mesh.text import decoded
 
@@ -24,9 +25,9 @@ PARAMETERS = {0: 0, 1: 1, 2: 2, 3: 0}
 
 
 def read_binary(path: Path) -> RawMesh | None:
-    """The mesh in a binary file of version 2, else None. Raises MeshError where it is cut off or its counts do not fit."""
+    """The mesh in a binary file of version 2 or 4.1, else None. Raises MeshError where it is cut off or its counts do not fit."""
     data = path.read_bytes()
-    head = re.match(rb"\$MeshFormat\r?\n2(?:\.[0-2])? 1 8\r?\n", data)
+    head = re.match(rb"\$MeshFormat\r?\n(2(?:\.[0-2])?|4\.1) 1 8\r?\n", data)
     if head is None:
         return None
     order = "<" if data[head.end() : head.end() + 4] == b"\x01\0\0\0" else ">"
@@ -34,18 +35,24 @@ def read_binary(path: Path) -> RawMesh | None:
     named = re.search(rb"\$PhysicalNames\s(.*?)\$EndPhysicalNames", data, re.DOTALL)
     try:
         names = physical_names(decoded(named[1], notes).replace("\r", "") if named else "")
-        numbers, points = _nodes(data, order)
-        rows: Rows = defaultdict(list)
-        for number, tags, table in _runs(data, order):
-            kind, groups = BY_GMSH[number], table[:, 1] if tags else np.zeros(len(table), np.int64)
-            for tag in np.unique(groups):
-                own = np.delete(table[groups == tag], np.s_[1 : 1 + tags], axis=1)
-                rows[kind.name, group_of(names, kind.dimension, int(tag))].append(own)
+        read = read_41 if head[1] == b"4.1" else _read_2
+        numbers, points, rows = read(data, order, names)
     except NotOrdinary:
         return None
     except (ValueError, IndexError) as error:
         raise mesh_error(path)(f"a section is cut off ({error})", cure=CURE) from None
     return raw_mesh(numbers, points, rows, names, path, notes)
+
+
+def _read_2(data: bytes, order: str, names: Names) -> tuple[Integers, Floats, Rows]:
+    numbers, points = _nodes(data, order)
+    rows: Rows = defaultdict(list)
+    for number, tags, table in _runs(data, order):
+        kind, groups = BY_GMSH[number], table[:, 1] if tags else np.zeros(len(table), np.int64)
+        for tag in np.unique(groups):
+            own = np.delete(table[groups == tag], np.s_[1 : 1 + tags], axis=1)
+            rows[kind.name, group_of(names, kind.dimension, int(tag))].append(own)
+    return numbers, points, rows
 
 
 def _section(data: bytes, name: str) -> tuple[int, int]:

@@ -13,6 +13,7 @@ from ancf_petsc.mesh.abaqus.deck import Card
 from ancf_petsc.mesh.abaqus.types import ElementType
 from ancf_petsc.mesh.mesh import Floats, Integers
 
+
 class Listed(NamedTuple):
     """Numbers that a set names one by one; instance: key of the one they belong to, "" for the scope of the set."""
 
