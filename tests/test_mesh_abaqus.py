@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -532,3 +533,11 @@ def test_the_force_on_the_bar_is_the_one_in_closed_form(tmp_path):
     path = tmp_path / "bar.inp"
     path.write_text(Style(Random(5), tmp_path).text(BAR), newline="")
     assert pulled(tmp_path, path) == pytest.approx(FORCE, rel=1e-9)
+
+
+def test_the_documents_list_every_keyword_that_is_read_or_refused(project):
+    from ancf_petsc.mesh.abaqus.cards import HANDLERS
+
+    text = (project / "docs" / "case-format.md").read_text()
+    listed = {word.replace(" ", "") for word in re.findall(r"`\*([A-Z ]+)`", text)}
+    assert set(HANDLERS) <= listed
