@@ -372,10 +372,15 @@ WRONG = {
     "a parameter": (
         "nodes",
         "*NODE\n1, 0, <x>, 0",
-        "not a number: found '<x>', expected numbers; write the deck without",
+        "not a number: found '<x>', expected numbers below 1e100; write the deck without",
     ),
     "a lonely sign": ("nodes", "*NODE\n1, 0, -, 0", "not a number: found '-'"),
     "a broken number": ("nodes", "*NODE\n1, 0, 1.0.0, 0", "not a number: found '1.0.0'"),
+    "a number beyond all": (
+        "nodes",
+        "*NODE\n1, 0, 1e400, 0",
+        "not a number: found '1E400', expected numbers below 1e100",
+    ),
     "half a node": ("nodes", "*NODE\n1.5, 0, 0, 0", r"line 2, \*NODE: not a whole number: found 1.5"),
     "node 0": ("nodes", "*NODE\n0, 0, 0, 0", r"a number of a node: found 0, expected 1 or more"),
     "a node twice": (

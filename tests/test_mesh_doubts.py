@@ -191,6 +191,16 @@ def test_sharing_counts_equal_rows(seed, corners):
         assert partner == (same[0] if same else -1)
 
 
+def test_many_sides_of_one_point_are_matched_in_no_time():
+    """A fan: with all sides of a point compared with each other it would be 10^10 comparisons."""
+    k = np.arange(50_000)
+    fan = np.stack([np.zeros_like(k), 1 + k, 2 + k], axis=1)
+    sides = np.vstack([fan, fan[::2, [2, 0, 1]]])
+    count, other = sharing(sides, 50_003)
+    assert count[:50_000].tolist() == [2, 1] * 25_000
+    assert other[50_000:].tolist() == list(range(0, 50_000, 2))
+
+
 @settings(max_examples=20)
 @given(st.integers(0, 10**6), st.sampled_from(["tetra", "hexahedron", "triangle"]))
 def test_cells_are_found_as_by_trying_all(seed, kind):

@@ -21,31 +21,44 @@ def sharing(sides: Integers, n_points: int) -> tuple[Integers, Integers]:
     return match_sides(sides, n_points)
 
 
+MOST_AT_A_POINT = 256
+"""Sides with one lowest point that are compared with each other; more are spread."""
+
+
 @kernel
 def match_sides(sides, n_points):
-    """Sides are sorted into buckets by their lowest point, where few are left to be compared."""
+    """Sides are sorted into buckets, where few are left to be compared: by their lowest point, which keeps neighbours together
+    in memory, or by a number made of all their points where too many have one lowest point."""
     m = sides.shape[0]
     ordered = np.empty_like(sides)
-    first = np.zeros(n_points + 1, np.int64)
+    at_point = np.zeros(n_points, np.int64)
     for side in range(m):
         sort_row(sides, ordered, side)
-        first[ordered[side, 0] + 1] += 1
-    for point in range(n_points):
-        first[point + 1] += first[point]
-    place = first[:-1].copy()
-    bucket = np.empty(m, np.int64)
+        at_point[ordered[side, 0]] += 1
+    spread = m > 0 and at_point.max() > MOST_AT_A_POINT
+    number = ordered[:, 0].copy()
+    if spread:
+        for side in range(m):
+            number[side] = spread_row(ordered, side, m)
+    buckets = max(n_points, m)
+    first = np.zeros(buckets + 1, np.int64)
     for side in range(m):
-        lowest = ordered[side, 0]
-        bucket[place[lowest]] = side
-        place[lowest] += 1
+        first[number[side] + 1] += 1
+    for bucket in range(buckets):
+        first[bucket + 1] += first[bucket]
+    place = first.copy()
+    row = np.empty(m, np.int64)
+    for side in range(m):
+        row[place[number[side]]] = side
+        place[number[side]] += 1
     count = np.ones(m, np.int64)
     other = np.full(m, -1, np.int64)
-    for point in range(n_points):
-        for i in range(first[point], first[point + 1]):
-            for j in range(i + 1, first[point + 1]):
-                a, b = bucket[i], bucket[j]
+    for bucket in range(buckets):
+        for i in range(first[bucket], first[bucket + 1]):
+            for j in range(i + 1, first[bucket + 1]):
+                a, b = row[i], row[j]
                 same = True
-                for k in range(1, sides.shape[1]):
+                for k in range(sides.shape[1]):
                     same = same and ordered[a, k] == ordered[b, k]
                 if same:
                     count[a] += 1
@@ -55,6 +68,16 @@ def match_sides(sides, n_points):
                     if other[b] < 0:
                         other[b] = a
     return count, other
+
+
+@register_jitable
+def spread_row(rows, row, buckets):
+    """A number below `buckets` (under 2^32), made of all entries of a row."""
+    key = np.uint64(0)
+    for k in range(rows.shape[1]):
+        key = (key ^ np.uint64(rows[row, k])) * np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio
+        key ^= key >> np.uint64(32)
+    return np.int64(((key >> np.uint64(32)) * np.uint64(buckets)) >> np.uint64(32))
 
 
 @register_jitable

@@ -16,6 +16,8 @@ from ancf_petsc.mesh.mesh import Floats, Integers
 QUOTED = re.compile(r'(?:"[^"]*"|[^,"\n])+')
 FORTRAN = str.maketrans("dD", "EE")
 NUMERIC = str.maketrans("", "", "0123456789eE+-.,\n")
+LARGEST = 1e100
+"""Larger coordinates have no volumes that are finite."""
 LARGEST_NUMBER = 2**53
 """Numbers of nodes and elements are read as floating point: up to here exactly."""
 
@@ -63,7 +65,7 @@ def table(card: Card) -> Table:
             flat = np.fromstring(joined, sep=",")
         except (DeprecationWarning, ValueError):
             raise _not_numbers(card) from None
-    if len(flat) != counts.sum():
+    if len(flat) != counts.sum() or not (np.abs(flat) < LARGEST).all():
         raise _not_numbers(card)
     return Table(flat, counts)
 
@@ -73,12 +75,14 @@ def _not_numbers(card: Card) -> MeshError:
         for word in text.translate(FORTRAN).split(","):
             word = "".join(word.split())
             try:
-                fits = not word or (not word.translate(NUMERIC) and float(word) is not None)
+                fits = not word or (not word.translate(NUMERIC) and abs(float(word)) < LARGEST)
             except ValueError:
                 fits = False
             if not fits:
                 cure = "write the deck without *PARAMETER" if "<" in word else "mend the line"
-                return card.error("not a number", line=line, got=word[:40], expected="numbers", cure=cure)
+                return card.error(
+                    "not a number", line=line, got=word[:40], expected="numbers below 1e100", cure=cure
+                )
     return card.error("the data lines are not numbers", cure="mend the deck")
 
 

@@ -19,6 +19,8 @@ from ancf_petsc.mesh.mesh import Floats, Integers
 from ancf_petsc.mesh.text import as_text
 
 DEEPEST = 32
+LARGEST = 1e100
+"""Larger coordinates have no volumes that are finite."""
 EXPONENT = re.compile(r"(?<=[\d.])([+-]\d)")
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:E[+-]?\d+)?")
 INCLUDE = re.compile(r"\s*INCLUDE\s*['\"]?\s*([^'\"]*)", re.IGNORECASE)
