@@ -379,7 +379,7 @@ WRONG = {
     "a number beyond all": (
         "nodes",
         "*NODE\n1, 0, 1e400, 0",
-        "not a number: found '1E400', expected numbers below 1e100",
+        "not a number: found '1e400', expected numbers below 1e100",
     ),
     "half a node": ("nodes", "*NODE\n1.5, 0, 0, 0", r"line 2, \*NODE: not a whole number: found 1.5"),
     "node 0": ("nodes", "*NODE\n0, 0, 0, 0", r"a number of a node: found 0, expected 1 or more"),
