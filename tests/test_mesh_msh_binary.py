@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from tiny_meshes import TWO, write_two_bricks
 
-from ancf_petsc.errors import MeshError
+from ancf_petsc import case_from_dict
+from ancf_petsc.errors import CaseError, MeshError
 from ancf_petsc.mesh.gmsh_session import gmsh_session
 from ancf_petsc.mesh.kinds import BY_GMSH
 from ancf_petsc.mesh.msh_binary import read_binary
@@ -150,3 +151,14 @@ def test_names_that_would_be_one_in_either_encoding_stay_apart(tmp_path):
 def test_a_path_with_a_zero_byte(tmp_path):
     with pytest.raises(MeshError, match="a path cannot hold a zero byte"):
         read_mesh(f"{tmp_path}/a\0b.msh", ("tetra",))
+
+
+def test_a_case_whose_mesh_has_a_zero_byte_in_its_path(tmp_path):
+    data = {
+        "title": "zero",
+        "mesh": {"file": "a\0b.msh", "element": "3413"},
+        "material": {"law": "svk", "young": 1.0, "poisson": 0.3},
+        "statics": {},
+    }
+    with pytest.raises(CaseError, match=r"mesh.file: found 'a\\x00b.msh', expected a file name"):
+        case_from_dict(data, tmp_path)
