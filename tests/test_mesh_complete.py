@@ -13,7 +13,7 @@ from ancf_petsc.mesh.complete import complete
 from ancf_petsc.mesh.kinds import KINDS
 from ancf_petsc.mesh.parts import outer_sides
 from ancf_petsc.mesh.read import read_mesh
-from ancf_petsc.plan.plan import draw
+from ancf_petsc.plan.plan import make_plan
 
 BAR = bar()
 PLANES = {"bottom": (2, 0.0), "top": (2, 0.2), "left": (0, 0.0), "front": (1, 0.0)}
@@ -109,7 +109,7 @@ def test_sets_of_nodes_are_the_faces_they_cover(tmp_path, code):
         "constraint": [{"group": "bottom", "fix": ["x", "y", "z"]}],
         "statics": {"steps": 1},
     }
-    plan = draw(case_from_dict(data, tmp_path))
+    plan = make_plan(case_from_dict(data, tmp_path))
     assert "bottom: a set of nodes, taken as the 2 faces it covers" in plan.mesh.notes
 
 
@@ -128,7 +128,7 @@ def test_nodes_that_cover_nothing_are_counted(tmp_path):
         "constraint": [{"group": name, "fix": ["x", "y", "z"]} for name in ("bottom", "loose", "edge")],
         "statics": {"steps": 1},
     }
-    notes = draw(case_from_dict(data, tmp_path)).mesh.notes
+    notes = make_plan(case_from_dict(data, tmp_path)).mesh.notes
     assert (
         "loose: a set of nodes; 2 of its 2 nodes belong to no whole face or edge in it: held as points"
         in notes

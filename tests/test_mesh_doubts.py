@@ -131,7 +131,9 @@ def test_faces_that_lie_on_others_and_do_not_match_are_said(kind, way):
 def test_a_crack_of_matching_faces_is_not_doubted():
     """mesh.duplicates = "keep" says that bodies lie against each other; faces that do not match are said even then."""
     bodies = [box(2, 2, 1), box(2, 2, 1, (0, 0, 1), (1, 1, 2))]
-    assert mesh_of(*bodies, join=False, duplicates="keep").notes == ["9 nodes lie on others: kept apart"]
+    assert mesh_of(*bodies, join=False, duplicates="keep").notes == [
+        '9 coincident nodes kept separate (mesh.duplicates = "keep")'
+    ]
     bodies[1] = box(1, 1, 1, (0, 0, 1), (1, 1, 2))
     notes = mesh_of(*bodies, join=False, duplicates="keep").notes
     assert any("lie on others that they do not match" in note for note in notes)

@@ -160,5 +160,5 @@ def test_a_case_whose_mesh_has_a_zero_byte_in_its_path(tmp_path):
         "material": {"law": "svk", "young": 1.0, "poisson": 0.3},
         "statics": {},
     }
-    with pytest.raises(CaseError, match=r"mesh.file: found 'a\\x00b.msh', expected a file name"):
+    with pytest.raises(CaseError, match="mesh.file: a NUL character"):
         case_from_dict(data, tmp_path)

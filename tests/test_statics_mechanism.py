@@ -9,7 +9,7 @@ from test_mesh_doubts import box, halves
 
 from ancf_petsc import case_from_dict
 from ancf_petsc.errors import CaseError
-from ancf_petsc.plan.plan import draw
+from ancf_petsc.plan.plan import make_plan
 
 
 def plan(folder, bodies, constraints, *, element="3413", kind="tetra", analysis="statics", section=None):
@@ -35,7 +35,7 @@ def plan(folder, bodies, constraints, *, element="3413", kind="tetra", analysis=
     }
     if section:
         data["section"] = section
-    return draw(case_from_dict(data, folder))
+    return make_plan(case_from_dict(data, folder))
 
 
 CLAMPED = [{"group": "bottom", "fix": ["x", "y", "z"]}]

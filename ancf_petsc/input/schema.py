@@ -48,7 +48,7 @@ def laws() -> Mapping[str, Law]:
 class MeshSpec(Table):
     """[mesh]: the file, from the case file's folder, and the element."""
 
-    file: Name = key('a file name; relative to the case file, such as "block.msh"', pattern=r"^[^\x00]+$")
+    file: Name = key('a file name; relative to the case file, such as "block.msh"')
     element: str = key(
         'a code of the catalogue, in quotes; such as "3413"', pattern=r"^(\d{4}|\d-\d+-\d-\d)(\+\d+)?$"
     )

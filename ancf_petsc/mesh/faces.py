@@ -35,39 +35,55 @@ def match_sides(sides, n_points):
     for side in range(m):
         sort_row(sides, ordered, side)
         at_point[ordered[side, 0]] += 1
-    spread = m > 0 and at_point.max() > MOST_AT_A_POINT
     number = ordered[:, 0].copy()
-    if spread:
+    if m > 0 and at_point.max() > MOST_AT_A_POINT:
         for side in range(m):
             number[side] = spread_row(ordered, side, m)
-    buckets = max(n_points, m)
+    first, row = into_buckets(number, max(n_points, m))
+    count = np.ones(m, np.int64)
+    other = np.full(m, -1, np.int64)
+    for bucket in range(len(first) - 1):
+        for i in range(first[bucket], first[bucket + 1]):
+            for j in range(i + 1, first[bucket + 1]):
+                if same_rows(ordered, row[i], row[j]):
+                    note_pair(count, other, row[i], row[j])
+    return count, other
+
+
+@register_jitable
+def into_buckets(number, buckets):
+    """Where each bucket begins (buckets + 1,), and the rows by bucket, ascending in each (m,)."""
     first = np.zeros(buckets + 1, np.int64)
-    for side in range(m):
-        first[number[side] + 1] += 1
+    for row in range(number.shape[0]):
+        first[number[row] + 1] += 1
     for bucket in range(buckets):
         first[bucket + 1] += first[bucket]
     place = first.copy()
-    row = np.empty(m, np.int64)
-    for side in range(m):
-        row[place[number[side]]] = side
-        place[number[side]] += 1
-    count = np.ones(m, np.int64)
-    other = np.full(m, -1, np.int64)
-    for bucket in range(buckets):
-        for i in range(first[bucket], first[bucket + 1]):
-            for j in range(i + 1, first[bucket + 1]):
-                a, b = row[i], row[j]
-                same = True
-                for k in range(sides.shape[1]):
-                    same = same and ordered[a, k] == ordered[b, k]
-                if same:
-                    count[a] += 1
-                    count[b] += 1
-                    if other[a] < 0:
-                        other[a] = b
-                    if other[b] < 0:
-                        other[b] = a
-    return count, other
+    rows = np.empty(number.shape[0], np.int64)
+    for row in range(number.shape[0]):
+        rows[place[number[row]]] = row
+        place[number[row]] += 1
+    return first, rows
+
+
+@register_jitable
+def same_rows(rows, a, b):
+    """Whether two rows are equal."""
+    same = True
+    for k in range(rows.shape[1]):
+        same = same and rows[a, k] == rows[b, k]
+    return same
+
+
+@register_jitable
+def note_pair(count, other, a, b):
+    """Two sides are the same."""
+    count[a] += 1
+    count[b] += 1
+    if other[a] < 0:
+        other[a] = b
+    if other[b] < 0:
+        other[b] = a
 
 
 @register_jitable

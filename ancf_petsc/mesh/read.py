@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
+
 from ancf_petsc.mesh.abaqus import read_abaqus
 from ancf_petsc.mesh.assemble import assemble
 from ancf_petsc.mesh.exodus import read_exodus
@@ -30,7 +32,9 @@ def read_mesh(
     """
     path = Path(path)
     _require_file(path)
-    return assemble(_raw(path), path, kinds, duplicates, element)
+    with np.errstate(all="ignore"):  # coordinates that are not finite are an error of `assemble`
+        raw = _raw(path)
+    return assemble(raw, path, kinds, duplicates, element)
 
 
 def _raw(path: Path) -> RawMesh:
