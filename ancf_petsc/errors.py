@@ -96,7 +96,9 @@ class Interrupted(AncfError):
 
 def did_you_mean(word: str, known: list[str] | tuple[str, ...]) -> str:
     """A cure for a misspelt word: the nearest known one, or the list of all."""
-    close = get_close_matches(word, known, n=1)
+    close = [name for name in known if name.casefold() == word.casefold()] or get_close_matches(
+        word, known, n=1
+    )
     listing = ", ".join(known) if known else "none"
     return f"did you mean {close[0]!r}? (there are: {listing})" if close else f"there are: {listing}"
 

@@ -145,7 +145,10 @@ def test_merging_joins_cells_parts_and_groups():
     assert mesh.cells.tolist() == [[0, 1, 2, 3], [1, 2, 3, 4]]
     assert mesh.groups["seam"].nodes.tolist() == [1, 2, 3]
     assert mesh.groups["seam"].parts[2].tolist() == [[1, 2, 3]]
-    assert mesh.notes == ["3 nodes lay on others: merged"]
+    assert mesh.notes == [
+        "3 nodes lay on others: merged",
+        "seam: 1 of its 1 faces lie within the body, not on its boundary",
+    ]
 
 
 def test_merging_may_not_collapse_a_cell_or_lay_cells_on_others():
@@ -175,7 +178,10 @@ def test_unused_nodes_belong_to_no_group_and_drop_their_parts():
     mesh = tetrahedra(points, blocks=[part("triangle", [(10, 11, 12), (10, 11, 15)], "wall")])
     assert mesh.groups["wall"].nodes.tolist() == [0, 1, 2]
     assert mesh.groups["wall"].parts[2].tolist() == [[0, 1, 2]]
-    assert mesh.notes == ["1 of 6 nodes belong to no element: kept, in no group"]
+    assert mesh.notes == [
+        "parts of groups whose corners belong to no element are left out: 1 of wall",
+        "1 of 6 nodes belong to no element: kept, in no group",
+    ]
 
 
 def test_a_part_listed_twice_counts_once():

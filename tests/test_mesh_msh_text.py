@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from tiny_meshes import TWO, write_two_bricks
 
+from ancf_petsc.errors import MeshError
 from ancf_petsc.mesh.assemble import assemble
 from ancf_petsc.mesh.generate import make_mesh
 from ancf_petsc.mesh.gmsh_file import read_gmsh
@@ -71,22 +72,72 @@ def test_what_is_not_ordinary_is_left_to_gmsh(tmp_path, version):
     for end in np.linspace(0, len(whole) - 2, 60).astype(int):
         path.write_bytes(whole[:end])
         assert read_ordinary(path) is None
-    for old, new in ((b"$EndNodes", b"x\n$EndNodes"), (b"$EndElements", b"7\n$EndElements")):
-        path.write_bytes(whole.replace(old, new))
-        assert read_ordinary(path) is None
+    path.write_bytes(whole.replace(b"$EndNodes", b"$EndNodes\n$Unheard\n1\n$EndUnheard"))
+    assert read_ordinary(path) is None
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_sections_that_say_nothing_of_the_mesh_are_passed_over(tmp_path, version):
+    path = write_two_bricks(tmp_path / "whole.msh", version=version, binary=False)
+    cells = len(read_ordinary(path).blocks)
+    path.write_text(path.read_text() + "$Periodic\n0\n$EndPeriodic\n$NodeData\n1\n\xe4\n$EndNodeData\n")
+    assert len(read_ordinary(path).blocks) == cells
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize(
+    ("mark", "line"),
+    [("$EndNodes", "900 0 0 0"), ("$EndElements", "900 4 2 1 1 1 2 3 4"), ("$EndElements", "7")],
+)
+def test_a_line_too_many_is_an_error_with_the_count(tmp_path, version, mark, line):
+    """Gmsh would drop the last cell without a word."""
+    path = write_two_bricks(tmp_path / "whole.msh", version=version, binary=False)
+    path.write_text(path.read_text().replace(mark, f"{line}\n{mark}"))
+    with pytest.raises(
+        MeshError, match=rf"\{mark.replace('End', '')} holds \d+ lines: expected \d+ as its first line"
+    ):
+        read_ordinary(path)
+
+
+@pytest.mark.parametrize("section", ["Nodes", "Elements"])
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_a_count_that_is_wrong_is_an_error(tmp_path, version, section):
+    path = write_two_bricks(tmp_path / "whole.msh", version=version, binary=False)
+    head, mark, tail = path.read_text().partition(f"${section}\n")
+    counts, _, rest = tail.partition("\n")
+    words = counts.split()
+    place = 1 if version > 4 else 0
+    words[place] = str(int(words[place]) + 1)
+    path.write_text(f"{head}{mark}{' '.join(words)}\n{rest}")
+    with pytest.raises(MeshError, match=rf"\${section} holds \d+ lines: expected \d+"):
+        read_ordinary(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("99 5 5 5", "41 5 5 5", "1 node numbers are given twice, first node 41"),
+        ("8 4 2 2 1", "4 4 2 2 1", "1 element numbers are given twice, first element 4"),
+        ("9 15 2 3", "3 15 2 3", "1 element numbers are given twice, first element 3"),
+    ],
+)
+def test_a_number_given_twice_is_an_error(tmp_path, old, new, message):
+    assert old in TWO
+    path = tmp_path / "odd.msh"
+    path.write_text(TWO.replace(old, new))
+    with pytest.raises(MeshError, match=message):
+        read_ordinary(path)
 
 
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        ("11 20 30 41", "11 20 30 42"),
-        ("99 5 5 5", "41 5 5 5"),
         ("4 4 2 1 1", "4 4 0 1 1"),
         ("4 4 2", "4 99 2"),
     ],
 )
 def test_what_does_not_fit_is_left_to_gmsh(tmp_path, old, new):
-    """A node that is missing or given twice, an element without tags, a kind nobody knows."""
+    """An element without tags, a kind nobody knows."""
     assert old in TWO
     path = tmp_path / "odd.msh"
     path.write_text(TWO.replace(old, new))

@@ -90,8 +90,8 @@ def test_families_of_med_are_groups(tmp_path):
     [
         ("m.vtu", "<VTKFile", "meshio cannot read it"),
         ("m.vtk", "# vtk DataFile Version 9.9\n", "meshio cannot read it"),
-        ("m.inp", "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n", "meshio cannot read it"),
-        ("m.bdf", "nothing\n", "meshio cannot read it"),
+        ("m.inp", "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n", "the file holds no nodes"),
+        ("m.bdf", "nothing\n", "the file holds no GRID"),
         ("m.inp", "*HEADING\n", "the file holds no nodes"),
         ("m.inp", "*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D4\n", "found no cells, expected tetra cells"),
         ("m.doc", "words", "not a format meshes are read from: found '.doc', expected one of .msh .vtu"),
@@ -111,3 +111,113 @@ def test_a_plane_mesh_gets_a_third_coordinate(tmp_path):
     square.write(tmp_path / "m.xdmf")
     mesh = read_mesh(tmp_path / "m.xdmf", ("quad",), element="2412")
     assert mesh.points.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+
+
+def test_cells_in_several_sets_are_counted_once(tmp_path):
+    body(cell_sets={"a": [[0, 1], [0, 1]], "b": [[], [0]]}).write(tmp_path / "m.vtu")
+    with pytest.raises(MeshError, match="found 2 tetra, expected hexahedron"):
+        read_mesh(tmp_path / "m.vtu", ("hexahedron",))
+
+
+class Foreign:
+    """What a reader of meshio might hand over."""
+
+    def __init__(self, **changes):
+        mesh = body(**changes.pop("made", {}))
+        self.points, self.cells, self.cell_sets, self.point_sets = mesh.points, mesh.cells, {}, {}
+        self.cell_data, self.point_data, self.field_data = {}, {}, {}
+        self.__dict__.update(changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"point_sets": {"held": np.array([0, 5])}},
+            "the set held names 1 members that are not there, first 6: expected 1 to 5",
+        ),
+        (
+            {"point_sets": {"held": np.array([-1])}},
+            "the set held names 1 members that are not there, first 0: expected 1 to 5",
+        ),
+        (
+            {"cell_sets": {"half": [[0], [2]]}},
+            "the set half names 1 members that are not there, first 3: expected 1 to 2",
+        ),
+        ({"cell_sets": {"half": [[0], [0], [0]]}}, "the set half speaks of 3 blocks of cells: expected 2"),
+        (
+            {"cells": [meshio.CellBlock("tetra", TETS + 2)]},
+            "tetra 1 refers to node 6, which the file does not hold|to node 7",
+        ),
+        (
+            {"cells": [meshio.CellBlock("tetra", TETS - 1)]},
+            "tetra 1 refers to node 0, which the file does not hold",
+        ),
+        ({"points": np.array(CORNERS) * np.nan}, "5 nodes have coordinates that are not finite"),
+    ],
+)
+def test_what_meshio_hands_over_is_checked(tmp_path, monkeypatch, changes, message):
+    path = tmp_path / "m.vtu"
+    path.write_text("as meshio likes it")
+    monkeypatch.setattr(meshio, "read", lambda path: Foreign(**changes))
+    with pytest.raises(MeshError, match=message):
+        read_mesh(path, ("tetra",))
+
+
+def test_cells_with_other_than_their_number_of_nodes(tmp_path, monkeypatch):
+    cells = [meshio.CellBlock("tetra", TETS)]
+    cells[0].data = np.hstack([TETS, TETS[:, :1]])
+    (tmp_path / "m.vtu").write_text("as meshio likes it")
+    monkeypatch.setattr(meshio, "read", lambda path: Foreign(cells=cells))
+    with pytest.raises(MeshError, match="2 tetra cells with 5 nodes: expected 4 nodes"):
+        read_mesh(tmp_path / "m.vtu", ("tetra",))
+
+
+def test_what_meshio_leaves_out_is_an_error_or_a_note(tmp_path):
+    """Marks of points that make no group are passed over; a section with cells it does not know is named."""
+    path = tmp_path / "m.mesh"
+    body().write(path)
+    text = path.read_text()
+    path.write_text(text.replace("End", "RequiredVertices\n1\n1\nEnd"))
+    mesh = read_mesh(path, ("tetra",))
+    assert len(mesh.cells) == 2
+    assert mesh.notes[0].startswith("left out of the mesh file: ")
+    assert "RequiredVertices" in mesh.notes[0]
+    path.write_text(text.replace("End", "TetrahedraP2\n0\nEnd"))
+    with pytest.raises(
+        MeshError, match=r"meshio cannot read it .*; write it again, or in another format such as .msh"
+    ) as error:
+        read_mesh(path, ("tetra",))
+    assert "damaged" not in str(error.value)
+    path = tmp_path / "m.su2"
+    path.write_text(
+        "NDIME= 3\nNPOIN= 4\n0 0 0 0\n1 0 0 1\n0 1 0 2\n0 0 1 3\nNELEM= 1\n10 0 1 2 3 0\nNMARK= 0\nNONSENSE 7\n"
+    )
+    with pytest.raises(MeshError, match=r"meshio leaves out part of it \(.*NONSENSE"):
+        read_mesh(path, ("tetra",))
+
+
+@pytest.mark.parametrize("name", ["m.vtu", "m.vtk", "m.med", "m.mesh"])
+def test_gmsh_or_vtk_read_the_same_volume(tmp_path, name):
+    """A second reader of the same file: Gmsh where it reads the format, pyvista elsewhere."""
+    from ancf_petsc.mesh.gmsh_session import gmsh_session
+    from ancf_petsc.mesh.kinds import KINDS, part_sizes
+
+    body().write(tmp_path / name)
+    mesh = read_mesh(tmp_path / name, ("tetra",))
+    volume = part_sizes(mesh.points, mesh.cells, KINDS["tetra"]).sum()
+    if name in ("m.vtu", "m.vtk"):
+        import pyvista
+
+        grid = pyvista.read(tmp_path / name)
+        grid = grid.extract_cells(grid.celltypes == 10)
+        counts = len(mesh.points), len(mesh.cells), float(grid.volume)
+        assert (grid.n_points, grid.n_cells) == counts[:2]
+    else:
+        with gmsh_session() as gmsh:
+            gmsh.merge(str(tmp_path / name))
+            tags = gmsh.model.mesh.getElementsByType(4)[0]
+            assert len(tags) == len(mesh.cells)
+            assert len(gmsh.model.mesh.getNodes()[0]) == len(mesh.points)
+            counts = (0, 0, abs(float(gmsh.model.mesh.getElementQualities(tags, "volume").sum())))
+    assert volume == pytest.approx(counts[2], rel=1e-12)

@@ -21,7 +21,7 @@ title = "{title}"
 units = "SI"                  # a label for plots
 
 [mesh]
-file = "{mesh}"{space}# from this file's folder; .msh of Gmsh, or what meshio reads
+file = "{mesh}"{space}# from this file's folder; .msh of Gmsh, .inp, .bdf, .exo, .vtu, ...
 element = "3413"              # linear tetrahedra
 
 # Groups of nodes come by name from the mesh file. More can be chosen by geometry:

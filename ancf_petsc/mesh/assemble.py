@@ -8,6 +8,7 @@ import numpy as np
 
 from ancf_petsc.errors import MeshError
 from ancf_petsc.mesh.coincident import TOLERANCE, coincident_pairs, representatives
+from ancf_petsc.mesh.doubts import doubts
 from ancf_petsc.mesh.kinds import KINDS, Kind, determinants, edge_lengths, part_kind
 from ancf_petsc.mesh.mesh import Floats, Group, Integers, Mesh
 from ancf_petsc.mesh.parts import row_keys, unique_rows
@@ -66,10 +67,12 @@ def assemble(raw: RawMesh, path: Path, kinds: tuple[str, ...], duplicates: str, 
     cell_numbers, cells, membership = _cells(bodies, numbering)
     used = np.zeros(len(points), dtype=bool)
     used[cells] = True
-    mesh = Mesh(points, kind.name, cells, {}, numbers, cell_numbers, used, source=str(path))
+    mesh = Mesh(points, kind.name, cells, {}, numbers, cell_numbers, used, list(raw.notes), source=str(path))
     _settle_duplicates(mesh, numbering, duplicates)
     _orient(mesh, kind, path)
     _build_groups(mesh, raw, others, membership, numbering)
+    mesh.refused |= raw.refused
+    mesh.notes += doubts(mesh, raw.boundary_only)
     unused = len(mesh.points) - np.count_nonzero(mesh.used)
     if unused:
         mesh.notes.append(f"{unused} of {len(mesh.points)} nodes belong to no element: kept, in no group")
@@ -104,13 +107,19 @@ def _body_blocks(
     blocks = [block for block in blocks if len(block.numbers)]
     unknown = [block for block in blocks if block.kind not in KINDS]
     known = [block for block in blocks if block.kind in KINDS]
-    counts: dict[str, int] = {}
-    for block in unknown + [b for b in known if KINDS[b.kind].dimension >= dimension]:
-        counts[block.kind] = counts.get(block.kind, 0) + len(block.numbers)
+    counts = _counts(unknown + [block for block in known if KINDS[block.kind].dimension >= dimension])
     if len(counts) == 1 and set(counts) <= set(kinds):
         bodies = [block for block in known if block.kind in counts]
         return bodies, [block for block in known if KINDS[block.kind].dimension < dimension]
     raise _wrong_cells(counts, known, kinds, element, path)
+
+
+def _counts(blocks: list[Block]) -> dict[str, int]:
+    """Kind -> number of cells, those that are listed in several groups once."""
+    numbers: dict[str, list[Integers]] = {}
+    for block in blocks:
+        numbers.setdefault(block.kind, []).append(block.numbers)
+    return {kind: len(np.unique(np.concatenate(parts))) for kind, parts in numbers.items()}
 
 
 def _wrong_cells(
@@ -129,9 +138,7 @@ def _wrong_cells(
         return wrong(
             f"found {listing}, expected {expected}", cure=ASK_FOR.get(kind, f"mesh with {wanted} cells")
         )
-    lower: dict[str, int] = {}
-    for block in blocks:
-        lower[block.kind] = lower.get(block.kind, 0) + len(block.numbers)
+    lower = _counts(blocks)
     listing = ", ".join(f"{count} {kind}" for kind, count in sorted(lower.items()))
     found = f"only {listing}" if listing else "no cells"
     dimension = KINDS[kinds[0]].dimension
@@ -239,26 +246,49 @@ def _build_groups(
     kind = KINDS[mesh.kind]
     rows: dict[str, list[Integers]] = {name: [] for name in raw.names}
     parts: dict[str, dict[int, list[Integers]]] = {name: {} for name in raw.names}
+    dropped: dict[str, int] = {}
     for block in blocks:
         if not block.names:
             continue
         nodes = numbering.of(block)
-        nodes = nodes[mesh.used[nodes].all(axis=1)]
         corners = _corners_of_parts(nodes, block.kind, kind, numbering.path)
+        there = mesh.used[corners].all(axis=1)
+        own = nodes[there].ravel()
         for name in block.names:
-            rows[name].append(nodes.ravel())
-            parts[name].setdefault(KINDS[block.kind].dimension, []).append(corners)
-    for name, cells in membership.items():
-        rows[name].append(mesh.cells[cells].ravel())
-        parts[name][kind.dimension] = [mesh.cells[cells, : kind.corners]]
+            rows[name].append(own[mesh.used[own]])
+            parts[name].setdefault(KINDS[block.kind].dimension, []).append(corners[there])
+            if not there.all():
+                dropped[name] = dropped.get(name, 0) + np.count_nonzero(~there)
+    if dropped:
+        listing = ", ".join(f"{count} of {name}" for name, count in dropped.items())
+        mesh.notes.append(f"parts of groups whose corners belong to no element are left out: {listing}")
     for name, numbers in raw.node_sets.items():
         nodes = numbering.find(numbers)
         rows[name].append(nodes[(nodes >= 0) & mesh.used[nodes]])
+    apart: dict[str, Integers] = {}
+    for name, cells in membership.items():
+        nodes = np.unique(mesh.cells[cells])
+        if (
+            name in raw.materials
+            and rows[name]
+            and not np.array_equal(np.unique(np.concatenate(rows[name])), nodes)
+        ):
+            apart[name] = cells
+            continue
+        rows[name].append(nodes)
+        parts[name][kind.dimension] = [mesh.cells[cells, : kind.corners]]
+    if apart:
+        mesh.notes.append(
+            f"{', '.join(apart)}: sets of nodes or faces, and sets of other elements, of one name: materials take the elements"
+        )
     bound = len(mesh.points)
     for name in raw.names:
         nodes = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *rows[name]]))
         own = {d: unique_rows(np.concatenate(found), bound) for d, found in sorted(parts[name].items())}
-        mesh.groups[name] = Group(name, nodes, {d: found for d, found in own.items() if len(found)})
+        own = {dimension: found for dimension, found in own.items() if len(found)}
+        if set(own) == {0} and len(nodes) > 1:  # several points are a set of nodes, which may cover faces
+            own = {}
+        mesh.groups[name] = Group(name, nodes, own, apart.get(name))
 
 
 def _corners_of_parts(nodes: Integers, name: str, kind: Kind, path: Path) -> Integers:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ancf_petsc.element.element import Element
@@ -11,6 +13,9 @@ from ancf_petsc.mesh.parts import row_keys, rows_in, unique_rows
 
 MOVED = 1e-12
 """Mid-nodes closer to the middle of their edge than this times the mesh size stay where they are."""
+
+SHOWN = 8
+"""Groups named in a note."""
 
 
 def complete(mesh: Mesh, element: Element) -> None:
@@ -22,6 +27,7 @@ def complete(mesh: Mesh, element: Element) -> None:
     mesh.kind = KINDS[mesh.kind].linear or mesh.kind
     if cells.shape[1] > KINDS[mesh.kind].nodes:
         _straighten(mesh, element)
+        _complete_groups(mesh, element)
         return
     by_corners: dict[int, list[tuple[int, ...]]] = {}
     for node in element.nodes:
@@ -46,6 +52,36 @@ def _straighten(mesh: Mesh, element: Element) -> None:
     if count:
         mesh.notes.append(
             f"{count} mid-nodes lay off the middle of their edge, by up to {largest:.3g}: moved onto it"
+        )
+
+
+def _complete_groups(mesh: Mesh, element: Element) -> None:
+    """Enter the mid-nodes that the mesh has into groups of linear parts, and into sets of corners alone."""
+    corner = np.zeros(len(mesh.points), bool)
+    corner[mesh.cells[:, : KINDS[mesh.kind].nodes]] = True
+    groups = {
+        name: group
+        for name, group in mesh.groups.items()
+        if (group.parts or len(group.nodes) > 1) and (group.parts or corner[group.nodes].all())
+    }
+    by_corners: dict[int, list[int]] = {}
+    for place, node in enumerate(element.nodes):
+        by_corners.setdefault(len(node.corners), []).append(place)
+    for size, places in by_corners.items():
+        if size == 1:
+            continue
+        nodes = mesh.cells[:, places].ravel()
+        around = np.array([element.nodes[place].corners for place in places])
+        corners = mesh.cells[:, around].reshape(-1, size)
+        for name in groups:
+            mesh.groups[name] = _with_new_nodes(mesh, mesh.groups[name], corners, nodes)
+    more = {name: len(mesh.groups[name].nodes) - len(group.nodes) for name, group in groups.items()}
+    completed = [f"{name} by {count}" for name, count in more.items() if count]
+    if completed:
+        listing = ", ".join(completed[:SHOWN])
+        others = f" and {len(completed) - SHOWN} groups more" if len(completed) > SHOWN else ""
+        mesh.notes.append(
+            f"groups that lack the nodes between their corners are completed: {listing} nodes{others}"
         )
 
 
@@ -86,7 +122,7 @@ def _with_new_nodes(mesh: Mesh, group: Group, corners: Integers, new: Integers) 
             else np.empty((0, corners.shape[1]), np.int64)
         )
         candidates = candidates[rows_in(corners[candidates], known, bound) >= 0]
-    return Group(group.name, np.concatenate((group.nodes, new[candidates])), group.parts)
+    return replace(group, nodes=np.union1d(group.nodes, new[candidates]))
 
 
 def _faces_of(parts: Integers, dimension: int, corners: int) -> Integers:

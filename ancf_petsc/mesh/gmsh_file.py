@@ -25,8 +25,12 @@ from ancf_petsc.mesh import gmsh_child
 from ancf_petsc.mesh.kinds import BY_GMSH
 from ancf_petsc.mesh.mesh import Floats, Integers
 from ancf_petsc.mesh.raw import Block, RawMesh, mesh_error
+from ancf_petsc.mesh.text import decoded
 
 CURE = "the file may be truncated or damaged: write it again"
+
+LEAST_PATIENCE, SLOWEST = 60.0, 1e5
+"""Seconds, and bytes a second: damaged counts keep Gmsh busy for ever; it reads whole files a hundred times faster."""
 
 Names = dict[tuple[int, int], str]
 
@@ -43,16 +47,23 @@ def read_gmsh(path: Path) -> RawMesh:
     """The mesh in a .msh file."""
     with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         header = _checked_header(data, path)
-        names = _physical_names(data)
+        notes: list[str] = []
+        names = _physical_names(data, notes)
         old = header.version < 4
         found = _contents(path, swapped=old)
         numbers, coordinates = found["nodes"]
         numbers, points = numbers.astype(np.int64), coordinates.reshape(-1, 3)
         if old:
             numbers, points = _with_lost_nodes(data, header, numbers, points, path)
+        announced = _announced(data, header)
     blocks = _blocks(found, names, old=old)
+    read = sum(len(block.numbers) for block in blocks)
+    if announced is not None and read < announced:
+        raise mesh_error(path)(
+            f"Gmsh reads {read} of the {announced} elements that $Elements announces", cure=CURE
+        )
     groups = [*names.values(), *(name for block in blocks for name in block.names)]
-    return RawMesh(numbers, points, blocks, list(dict.fromkeys(groups)))
+    return RawMesh(numbers, points, blocks, list(dict.fromkeys(groups)), notes=notes)
 
 
 def _checked_header(data: mmap.mmap, path: Path) -> Header:
@@ -66,8 +77,10 @@ def _checked_header(data: mmap.mmap, path: Path) -> Header:
             "not a Gmsh mesh: it does not begin with $MeshFormat", cure="write it again as .msh 2.2 or 4.1"
         )
     for section, old in ((b"Nodes", b"NOD"), (b"Elements", b"ELM")):
-        begun = data.find(b"$" + section) >= 0 or data.find(b"$" + old) >= 0
-        ended = data.find(b"$End" + section) >= 0 or data.find(b"$END" + old) >= 0
+        parametric = section == b"Nodes" and data.find(b"$ParametricNodes") >= 0
+        begun = parametric or data.find(b"$" + section) >= 0 or data.find(b"$" + old) >= 0
+        endings = (b"$End" + section, b"$END" + old, b"$EndParametric" + section)
+        ended = any(data.find(ending) >= 0 for ending in endings)
         if not (begun and ended):
             state = "is not finished" if begun else "is missing"
             raise wrong(f"the section ${section.decode()} {state}", cure=CURE)
@@ -82,10 +95,10 @@ def _checked_header(data: mmap.mmap, path: Path) -> Header:
     return Header(float(header[1]), header[2] == "1", "<" if data[start.end()] == 1 else ">")
 
 
-def _physical_names(data: mmap.mmap) -> Names:
+def _physical_names(data: mmap.mmap, notes: list[str]) -> Names:
     """(dimension, tag) -> name, in the order of the file."""
     section = re.search(rb"\$PhysicalNames\s(.*?)\$EndPhysicalNames", data, re.DOTALL)
-    lines = section[1].decode("utf-8", "replace") if section else ""
+    lines = decoded(section[1], notes) if section else ""
     entries = re.findall(r'(\d+)\s+(-?\d+)\s+"([^"\n]*)"', lines)
     return {(int(dimension), abs(int(tag))): name for dimension, tag, name in entries}
 
@@ -95,7 +108,13 @@ def _contents(path: Path, *, swapped: bool) -> dict[str, Any]:
     command = [sys.executable, "-P", gmsh_child.__file__, str(path), str(int(swapped))]
     # A Gmsh built with MPI must not take itself for a rank of this run.
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMI", "PMIX_", "MPI_"))}
-    child = subprocess.run(command, capture_output=True, env=environment, stdin=subprocess.DEVNULL)
+    patience = LEAST_PATIENCE + path.stat().st_size / SLOWEST
+    try:
+        child = subprocess.run(
+            command, capture_output=True, env=environment, stdin=subprocess.DEVNULL, timeout=patience
+        )
+    except subprocess.TimeoutExpired:
+        raise mesh_error(path)(f"Gmsh does not come to an end of it in {patience:.0f} s", cure=CURE) from None
     if child.returncode == 0:
         return pickle.loads(child.stdout)
     reason = " ".join(child.stdout.decode("utf-8", "replace").split())
@@ -106,6 +125,18 @@ def _contents(path: Path, *, swapped: bool) -> dict[str, Any]:
         cure = "the file may be truncated or damaged, or elements refer to nodes it lacks: write it again"
         raise wrong(f"Gmsh crashes on it ({signal.Signals(-child.returncode).name})", cure=cure)
     raise wrong(f"Gmsh cannot read it ({reason or 'no reason given'})", cure=CURE)
+
+
+def _announced(data: mmap.mmap, header: Header) -> int | None:
+    """How many elements the section begins with; None where it does not begin with numbers."""
+    start = re.search(rb"\$(?:Elements|ELM)[ \t]*\r?\n", data)
+    if start is None:
+        return None
+    if header.version >= 4 and header.binary:
+        return int(np.frombuffer(data[start.end() + 8 : start.end() + 16], header.order + "u8")[0])
+    words = data[start.end() : start.end() + 200].split()
+    place = 1 if header.version >= 4 else 0
+    return int(words[place]) if len(words) > place and words[place].isdigit() else None
 
 
 def _blocks(found: dict[str, Any], names: Names, *, old: bool) -> list[Block]:

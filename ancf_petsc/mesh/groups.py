@@ -167,6 +167,8 @@ def _sorted(rows: Integers) -> Integers:
 
 def find_group(mesh: Mesh, name: str, key: str, file: str | Path | None) -> Group:
     """The group of a name; CaseError about `key` where there is none or where it is empty."""
+    if name in mesh.refused:
+        raise CaseError(mesh.refused[name], file=file, key=key, got=name, cure="mend it in the mesh file")
     group = mesh.groups.get(name)
     if group is None:
         raise CaseError(
@@ -217,6 +219,27 @@ def parts_for_support(mesh: Mesh, group: Group) -> dict[int, Integers]:
     return {1: unique_rows(edges, len(mesh.points))} if len(edges) and boundary.shape[1] > 2 else {}
 
 
+def describe_set(mesh: Mesh, group: Group) -> str | None:
+    """What a support on a set of nodes of the mesh file holds, in words; None for parts and for a single node."""
+    if group.parts or len(group.nodes) < 2:
+        return None
+    parts = parts_for_support(mesh, group)
+    covered = _belongs(
+        mesh, np.concatenate([np.empty(0, np.int64), *(rows.ravel() for rows in parts.values())])
+    )
+    corners = _belongs(mesh, mesh.cells[:, : KINDS[KINDS[mesh.kind].linear or mesh.kind].nodes].ravel())
+    loose = np.count_nonzero(corners[group.nodes] & ~covered[group.nodes])
+    what = {0: "point", 1: "edge", 2: "face"}
+    found = [f"{len(rows)} {what[dimension]}s" for dimension, rows in parts.items()]
+    said = f"{group.name}: a set of nodes, taken as the {' and '.join(found)} it covers" if found else ""
+    if loose:
+        count = (
+            f"{loose} of its {len(group.nodes)} nodes belong to no whole face or edge in it: held as points"
+        )
+        said = f"{said}; {count}" if said else f"{group.name}: a set of nodes; {count}"
+    return said or None
+
+
 def surface_of(mesh: Mesh, group: Group) -> Integers | None:
     """Sides (m, corners) the group consists of, its own or boundary sides; None where it is no surface."""
     dimension = _dimension(mesh) - 1
@@ -232,7 +255,9 @@ def measure(mesh: Mesh, dimension: int, parts: Integers) -> float:
 
 
 def cells_of(mesh: Mesh, group: Group) -> Integers:
-    """Ascending indices of the cells that are the group's parts, else of those with all nodes in it."""
+    """Ascending indices of the cells the name stands for, else that are the group's parts, else with all nodes in it."""
+    if group.cells is not None:
+        return group.cells
     own = group.parts.get(_dimension(mesh))
     if own is None:
         return np.flatnonzero(_belongs(mesh, group.nodes)[mesh.cells].all(axis=1))

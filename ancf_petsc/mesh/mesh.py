@@ -18,11 +18,13 @@ class Group:
     nodes: (k,) ascending indices of points, mid-nodes of quadratic parts included.
     parts: dimension (0 point, 1 line, 2 face, 3 volume) -> (m, corners) indices of points, each part
         once. Empty for a group that is only a set of nodes.
+    cells: (m,) indices of the cells the name stands for where a material is given to it, if those are not its parts.
     """
 
     name: str
     nodes: Integers
     parts: dict[int, Integers] = field(default_factory=dict)
+    cells: Integers | None = None
 
 
 @dataclass
@@ -37,6 +39,7 @@ class Mesh:
     used: (n,) whether a cell uses the point.
     boundary: (m, corners) sides of one cell only; `groups.boundary_faces` finds them when first asked.
     notes: what the reader did or noticed, for the log.
+    refused: names of the file that cannot be used as groups -> why.
     """
 
     points: Floats
@@ -49,6 +52,7 @@ class Mesh:
     notes: list[str] = field(default_factory=list)
     source: str = ""
     boundary: Integers | None = field(default=None, repr=False)
+    refused: dict[str, str] = field(default_factory=dict)
 
     @property
     def size(self) -> float:

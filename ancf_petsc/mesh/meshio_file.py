@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,12 +22,17 @@ from ancf_petsc.mesh.raw import Block, RawMesh, mesh_error
 
 TAGS = ("gmsh:physical", "medit:ref", "nastran:ref", "netgen:index", "su2:tag", "abaqus:material")
 SAME = {"tetra4": "tetra"}
+CURE = "write it again, or in another format such as .msh, .vtu or .inp"
+HARMLESS = re.compile(
+    r"RequiredVertices|Tangent|Ridges|Gmf(?:Required|Corners|Ridges|Tang|Norm)|some time data|debugging"
+)
+"""What meshio may skip: marks of points and edges that make no group."""
 ALL = ".msh .vtu .vtk .xdmf .inp .med .bdf .mesh"
 
 
 def read_meshio(path: Path) -> RawMesh:
     """The mesh in a file of any format meshio reads."""
-    mesh = _read(path)
+    mesh, notes = _read(path)
     points = np.zeros((len(mesh.points), 3))
     if len(points):
         points[:, : mesh.points.shape[1]] = mesh.points
@@ -40,17 +46,48 @@ def read_meshio(path: Path) -> RawMesh:
     ]
     listed = [
         Block(block.kind, block.numbers[rows], block.nodes[rows], (name,))
-        for name, number, rows in _cell_sets(mesh, kinds)
+        for name, number, rows in _cell_sets(mesh, kinds, path)
         for block in (blocks[number],)
         if len(rows)
     ]
-    node_sets = {name: np.asarray(rows, dtype=np.int64) + 1 for name, rows in _point_sets(mesh)}
+    node_sets = {name: _rows(rows, len(points), name, path) + 1 for name, rows in _point_sets(mesh)}
     names = [*mesh.cell_sets, *(name for block in listed for name in block.names), *node_sets]
-    return RawMesh(numbers, points, blocks + listed, list(dict.fromkeys(names)), node_sets)
+    _check_widths(blocks, path)
+    return RawMesh(numbers, points, blocks + listed, list(dict.fromkeys(names)), node_sets, notes=notes)
 
 
-def _read(path: Path) -> Any:
-    """meshio's mesh; meshio prints, and may leave the interpreter, when it cannot read."""
+def _check_widths(blocks: list[Block], path: Path) -> None:
+    """Every cell has as many nodes as its kind."""
+    for block in blocks:
+        kind = KINDS.get(block.kind)
+        if kind and len(block.nodes) and block.nodes.shape[1] != kind.nodes:
+            raise mesh_error(path)(
+                f"{len(block.nodes)} {block.kind} cells with {block.nodes.shape[1]} nodes",
+                expected=f"{kind.nodes} nodes",
+                cure="write the mesh again",
+            )
+
+
+def _rows(rows: Any, count: int, name: str, path: Path) -> Integers:
+    """The members of a set, all of which must be there."""
+    found = np.asarray(rows).ravel()
+    if not np.issubdtype(found.dtype, np.integer):
+        found = found.astype(np.int64) if not len(found) or np.array_equal(found, np.floor(found)) else found
+    outside = found[(found < 0) | (found >= count)]
+    if len(outside):
+        raise mesh_error(path)(
+            f"the set {name} names {len(outside)} members that are not there, first {outside[0] + 1}",
+            expected=f"1 to {count}",
+            cure="write the mesh again",
+        )
+    return found.astype(np.int64)
+
+
+def _read(path: Path) -> tuple[Any, list[str]]:
+    """meshio's mesh, and what it leaves out without harm; it prints, and may leave the interpreter, when it cannot read.
+
+    Raises MeshError also where it leaves out what may belong to the mesh.
+    """
     import meshio
 
     wrong = mesh_error(path)
@@ -69,11 +106,12 @@ def _read(path: Path) -> Any:
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
     else:
-        return mesh
+        lines = " ".join(said.getvalue().split())
+        if lines and not HARMLESS.search(lines):
+            raise wrong(f"meshio leaves out part of it ({lines})", cure=CURE)
+        return mesh, [f"left out of the mesh file: {lines}"] if lines else []
     reason = " ".join(reason.split())
-    raise wrong(
-        f"meshio cannot read it ({reason})", cure="the file may be truncated or damaged: write it again"
-    )
+    raise wrong(f"meshio cannot read it ({reason or 'no reason given'})", cure=CURE)
 
 
 def _nodes(block: Any, kind: str) -> np.ndarray:
@@ -83,13 +121,18 @@ def _nodes(block: Any, kind: str) -> np.ndarray:
     return np.asarray(block.data)
 
 
-def _cell_sets(mesh: Any, kinds: list[str]) -> Iterator[tuple[str, int, Integers]]:
+def _cell_sets(mesh: Any, kinds: list[str], path: Path) -> Iterator[tuple[str, int, Integers]]:
     """Name, number of the cell block, rows of it."""
     for name, by_block in mesh.cell_sets.items():
-        for block, rows in enumerate(by_block[: len(kinds)]):
+        if len(by_block) > len(kinds):
+            raise mesh_error(path)(
+                f"the set {name} speaks of {len(by_block)} blocks of cells",
+                expected=f"{len(kinds)}",
+                cure=CURE,
+            )
+        for block, rows in enumerate(by_block):
             if rows is not None:
-                rows = np.asarray(rows, dtype=np.int64)
-                yield name, block, rows[rows < len(mesh.cells[block].data)]
+                yield name, block, _rows(rows, len(mesh.cells[block].data), name, path)
     for key, by_block in mesh.cell_data.items():
         if key == "cell_tags" and hasattr(mesh, "cell_tags"):
             names = dict(mesh.cell_tags)

@@ -1,9 +1,9 @@
 """Text files of Gmsh (.msh 2.2 and 4.1) as Gmsh writes them, read section by section in this process.
 
 A small mesh is read before a process with Gmsh in it has started, a large one several times faster; meshio, which
-reads them too, loses the numbers of nodes and cells and all but one group of a cell. Nothing here judges a file:
-whatever is out of the ordinary (binary numbers, other sections, a count that does not fit, a kind of cell unknown
-here, a node given twice or missing) is left to Gmsh, whose word counts.
+reads them too, loses the numbers of nodes and cells and all but one group of a cell. What is out of the
+ordinary (other sections, a kind of cell unknown here) is left to Gmsh; what does not fit (a count, a number given twice)
+is an error, since Gmsh drops cells without a word.
 """
 
 from __future__ import annotations
@@ -18,11 +18,18 @@ import numpy as np
 
 from ancf_petsc.mesh.kinds import BY_GMSH
 from ancf_petsc.mesh.mesh import Floats, Integers
-from ancf_petsc.mesh.raw import Block, RawMesh
+from ancf_petsc.mesh.raw import Block, RawMesh, mesh_error
+from ancf_petsc.mesh.text import decoded
 
 SECTIONS = {"2.2": ("Nodes", "Elements"), "4.1": ("Entities", "Nodes", "Elements")}
+OTHER_SECTIONS = {"Periodic", "NodeData", "ElementData", "ElementNodeData", "InterpolationScheme", "Comments"}
+"""They say nothing of nodes, elements and groups."""
+PARAMETRIC = "ParametricNodes"
+"""Nodes of version 2 with their place on the entity behind the coordinates."""
 MOST_RUNS = 10_000
 """Of elements of one kind with equally many tags: more are not worth looking at one by one."""
+
+CURE = "the file is truncated or damaged: write it again"
 
 Names = dict[tuple[int, int], str]
 Rows = dict[tuple[str, tuple[str, ...]], list[Integers]]
@@ -33,18 +40,53 @@ class NotOrdinary(Exception):
 
 
 def read_ordinary(path: Path) -> RawMesh | None:
-    """The mesh in an ordinary text file, else None."""
+    """The mesh in an ordinary text file, else None. Raises MeshError where counts or numbers of one do not fit."""
+    notes: list[str] = []
     try:
-        version, sections = _sections(path)
-        names = _physical_names(sections.pop("PhysicalNames", ""))
+        version, sections = _sections(path, notes)
+        names = physical_names(sections.pop("PhysicalNames", ""))
         read = _read_22 if version == "2.2" else _read_41
         numbers, points, rows = read(sections, names)
-        return _mesh(numbers, points, rows, names)
+        return raw_mesh(numbers, points, rows, names, path, notes)
     except (NotOrdinary, ValueError, IndexError):
+        check_lines(path)
         return None
 
 
-def _sections(path: Path) -> tuple[str, dict[str, str]]:
+def check_lines(path: Path) -> None:
+    """Compare the lines of $Nodes and $Elements of a text file with the numbers they announce. Raises MeshError."""
+    data = path.read_bytes()
+    head = re.match(rb"\s*\$MeshFormat\s+(\d+(?:\.\d+)?)\s+0\s", data)
+    if head is None:
+        return
+    version = float(head[1])
+    for name in ("Nodes", PARAMETRIC, "Elements"):
+        found = re.search(
+            rb"^\$" + name.encode() + rb"[ \t]*\r?\n(.*?)^\$End" + name.encode(),
+            data,
+            re.DOTALL | re.MULTILINE,
+        )
+        if found is None:
+            continue
+        lines = [line for line in found[1].split(b"\n") if line.strip()]
+        try:
+            counts = [int(word) for word in lines[0].split()]
+            expected = (
+                counts[0]
+                if version < 4
+                else counts[0] + counts[1] * (2 if name == "Nodes" and version > 4 else 1)
+            )
+        except (ValueError, IndexError):
+            raise mesh_error(path)(f"${name} does not begin with how many they are", cure=CURE) from None
+        if len(lines) - 1 != expected:
+            raise mesh_error(path)(
+                f"${name} holds {len(lines) - 1} lines",
+                expected=f"{expected} as its first line announces",
+                cure=CURE,
+            )
+
+
+def _sections(path: Path, notes: list[str]) -> tuple[str, dict[str, str]]:
     """Version, and the text of each section by its name."""
     data = path.read_bytes()
     head = re.match(rb"\$MeshFormat\r?\n(2\.2|4\.1) 0 8\r?\n\$EndMeshFormat\s", data)
@@ -55,17 +97,28 @@ def _sections(path: Path) -> tuple[str, dict[str, str]]:
     while (begun := start.match(data, at)) is not None:
         ending = b"$End" + begun[1]
         end = data.find(ending, begun.end())
-        if end < 0 or begun[1] in found:
+        if end < 0 or begun[1].decode() in found:
             raise NotOrdinary
-        found[begun[1].decode()] = data[begun.end() : end].decode("utf-8")
+        text = data[begun.end() : end]
+        name = begun[1].decode()
+        if name not in OTHER_SECTIONS:
+            found[name] = decoded(text, notes) if name == "PhysicalNames" else text.decode("ascii")
         at = end + len(ending)
     wanted = {*SECTIONS[version]}
+    if PARAMETRIC in found and version == "2.2":
+        found["Nodes"] = _without_parameters(found.pop(PARAMETRIC))
     if data[at:].strip() or {*found} - {"PhysicalNames"} != wanted:
         raise NotOrdinary
     return version, found
 
 
-def _physical_names(text: str) -> Names:
+def _without_parameters(text: str) -> str:
+    """The lines of $ParametricNodes as those of $Nodes."""
+    first, *lines = text.strip().split("\n")
+    return "\n".join([first, *(" ".join(line.split(None, 4)[:4]) for line in lines)])
+
+
+def physical_names(text: str) -> Names:
     """(dimension, tag) -> name, in the order of the file."""
     entries = re.findall(r'^(\d) (\d+) "([^"\n]*)"\s*$', text, re.MULTILINE)
     if text and len(entries) != int(text.split(maxsplit=1)[0]):
@@ -83,7 +136,7 @@ def _numbers(text: str, kind: type) -> np.ndarray:
             raise NotOrdinary from None
 
 
-def _group(names: Names, dimension: int, tag: int) -> tuple[str, ...]:
+def group_of(names: Names, dimension: int, tag: int) -> tuple[str, ...]:
     if tag < 0:
         raise NotOrdinary
     return (names.get((dimension, tag)) or f"physical_{dimension}_{tag}",) if tag else ()
@@ -100,7 +153,7 @@ def _read_22(sections: dict[str, str], names: Names) -> tuple[Integers, Floats, 
     for number, run in _runs(_numbers(sections["Elements"], np.int64)):
         kind, tags = BY_GMSH[number], run[:, 3]
         for tag in np.unique(tags):
-            group = _group(names, kind.dimension, int(tag))
+            group = group_of(names, kind.dimension, int(tag))
             own = run if len(tags) == 1 else run[tags == tag]
             rows[kind.name, group].append(np.delete(own, np.s_[1 : 3 + own[0, 2]], axis=1))
     return table[:, 0].astype(np.int64), table[:, 1:], rows
@@ -136,7 +189,7 @@ def _runs(flat: Integers) -> Iterator[tuple[int, Integers]]:
 def _read_41(sections: dict[str, str], names: Names) -> tuple[Integers, Floats, Rows]:
     groups = _entity_groups(sections["Entities"], names)
     numbers, points = _nodes_41(_numbers(sections["Nodes"], float))
-    flat, rows, at, count = _numbers(sections["Elements"], np.int64), defaultdict(list), 4, 0
+    flat, rows, at, count, blocks = _numbers(sections["Elements"], np.int64), defaultdict(list), 4, 0, 0
     while at < len(flat):
         dimension, entity, number, size = (int(value) for value in flat[at : at + 4])
         if number not in BY_GMSH or (dimension, entity) not in groups:
@@ -144,8 +197,8 @@ def _read_41(sections: dict[str, str], names: Names) -> tuple[Integers, Floats, 
         width, at = 1 + BY_GMSH[number].nodes, at + 4
         block = flat[at : at + size * width].reshape(size, width)
         rows[BY_GMSH[number].name, groups[dimension, entity]].append(block)
-        at, count = at + block.size, count + size
-    if count != flat[1]:
+        at, count, blocks = at + block.size, count + size, blocks + 1
+    if count != flat[1] or blocks != flat[0]:
         raise NotOrdinary
     return numbers, points, rows
 
@@ -161,7 +214,7 @@ def _nodes_41(flat: Floats) -> tuple[Integers, Floats]:
         points.append(flat[at + size : at + 4 * size].reshape(size, 3))
         at += 4 * size
     found = np.concatenate(numbers).astype(np.int64)
-    if len(found) != flat[1]:
+    if len(found) != flat[1] or len(numbers) - 1 != flat[0]:
         raise NotOrdinary
     return found, np.concatenate(points)
 
@@ -177,22 +230,35 @@ def _entity_groups(text: str, names: Names) -> dict[tuple[int, int], tuple[str, 
         words = line.split()
         first = 4 if dimension == 0 else 7
         tags = [int(word) for word in words[first + 1 : first + 1 + int(words[first])]]
-        every = [name for tag in tags for name in _group(names, int(dimension), tag)]
+        every = [name for tag in tags for name in group_of(names, int(dimension), tag)]
         found[int(dimension), int(words[0])] = tuple(dict.fromkeys(every))
     return found
 
 
-def _mesh(numbers: Integers, points: Floats, rows: Rows, names: Names) -> RawMesh:
-    """Blocks in meshio's order of nodes, every node of theirs among the numbers."""
-    if len(np.unique(numbers)) < len(numbers) or not np.isfinite(points).all():
-        raise NotOrdinary
+def raw_mesh(
+    numbers: Integers, points: Floats, rows: Rows, names: Names, path: Path, notes: list[str]
+) -> RawMesh:
+    """Blocks in meshio's order of nodes. Raises MeshError where two nodes or two elements have one number."""
+    _refuse_doubled("node", numbers, path)
+    _refuse_doubled(
+        "element",
+        np.concatenate([table[:, 0] for parts in rows.values() for table in parts] or [numbers]),
+        path,
+    )
     blocks = []
     for (kind, groups), parts in rows.items():
         table = np.concatenate(parts)
         nodes = table[:, 1:]
-        if not np.isin(nodes, numbers).all():
-            raise NotOrdinary
         order = next(known.gmsh_order for known in BY_GMSH.values() if known.name == kind)
         blocks.append(Block(kind, table[:, 0], nodes[:, order] if order else nodes, groups))
     spoken = [*names.values(), *(name for block in blocks for name in block.names)]
-    return RawMesh(numbers, points, blocks, list(dict.fromkeys(spoken)))
+    return RawMesh(numbers, points, blocks, list(dict.fromkeys(spoken)), notes=notes)
+
+
+def _refuse_doubled(what: str, numbers: Integers, path: Path) -> None:
+    ascending = np.sort(numbers)
+    twice = np.unique(ascending[1:][ascending[1:] == ascending[:-1]])
+    if len(twice):
+        raise mesh_error(path)(
+            f"{len(twice)} {what} numbers are given twice, first {what} {twice[0]}", cure=CURE
+        )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ancf_petsc.mesh.kinds import KINDS
+from ancf_petsc.mesh.faces import sharing, sides_of
 from ancf_petsc.mesh.mesh import Integers
 
 _WORD = 2**63
@@ -46,7 +46,5 @@ def rows_in(rows: Integers, others: Integers, bound: int) -> np.ndarray:
 
 def outer_sides(kind: str, cells: Integers, bound: int) -> Integers:
     """Sides (m, corners) that belong to one of cells (e, k) only, oriented outwards."""
-    sides = np.array(KINDS[kind].sides)
-    every = cells[:, sides].reshape(-1, sides.shape[1])
-    _, first, count = np.unique(row_keys(every, bound), return_index=True, return_counts=True)
-    return every[np.sort(first[count == 1])]
+    sides = sides_of(kind, cells)
+    return sides[sharing(sides, bound)[0] == 1]

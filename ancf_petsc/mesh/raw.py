@@ -30,6 +30,9 @@ class RawMesh:
     node_numbers: (n,), points: (n, 3).
     names: groups the file speaks of, in its order, also those without a cell.
     node_sets: name -> node numbers, groups without parts.
+    materials: names of sets of cells that name materials only where a node set or a surface has the name too.
+    notes: what the reader noticed, for the log.
+    refused: names that cannot be used as groups -> why; boundary_only: groups whose parts must be on the boundary.
     """
 
     node_numbers: Integers
@@ -37,6 +40,10 @@ class RawMesh:
     blocks: list[Block]
     names: list[str] = field(default_factory=list)
     node_sets: dict[str, Integers] = field(default_factory=dict)
+    materials: set[str] = field(default_factory=set)
+    notes: list[str] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)
+    boundary_only: set[str] = field(default_factory=set)
 
 
 def mesh_error(path: str | Path) -> partial[MeshError]:

@@ -33,7 +33,7 @@ def free_motions(
         values, vectors = np.linalg.eigh(gram + np.diag(others))
         null = vectors[:, values <= 1e-12 * max(np.trace(gram), others.sum(), 1e-300)]
         if null.shape[1]:
-            found[label] = _names(null, centre, size)
+            found[label] = motion_names(null, centre, size)
     return found
 
 
@@ -61,7 +61,7 @@ def _gram_matrices(vectors, driven, piece, pieces, slopes):
     return [(label, grams[label], centre[label], size[label]) for label in range(pieces)]
 
 
-def _names(null: NDArray, centre: NDArray, size: float) -> list[str]:
+def motion_names(null: NDArray, centre: NDArray, size: float) -> list[str]:
     """Translations first, then rotations with a point of their axis. null (6, k)."""
     _, singular, basis = np.linalg.svd(null[3:])
     rank = int((singular > 1e-6).sum())
@@ -72,7 +72,7 @@ def _names(null: NDArray, centre: NDArray, size: float) -> list[str]:
     for mode in (null @ basis[:rank].T).T:
         axis = mode[3:] / np.linalg.norm(mode[3:])
         point = centre + np.cross(axis, mode[:3]) * size / np.linalg.norm(mode[3:])
-        place = ", ".join(f"{c:.6g}" for c in point)
+        place = ", ".join(f"{c:.6g}" for c in np.where(np.abs(point) < 1e-9 * size, 0.0, point))
         names.append(f"rotation about the axis along {_direction(axis)} through ({place})")
     return names
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input.schema import ConstraintSpec
+from ancf_petsc.mesh.groups import describe_set
 from ancf_petsc.plan.part import Part
 from ancf_petsc.plan.supports import displacement, held_slopes
 from ancf_petsc.plan.supports.table import SupportTable
@@ -21,8 +22,19 @@ def enter_supports(part: Part) -> SupportTable:
         for spec in part.spec.constraint:
             for enter in KINDS:
                 enter(spec, part, table)
+            _note_set(spec, part)
         table.finish()
     except CaseError as error:
         error.file = error.file or part.file
         raise
     return table
+
+
+def _note_set(spec: ConstraintSpec, part: Part) -> None:
+    """Say what a set of nodes of the mesh file is taken for, where the element has more than corners to hold."""
+    row = part.element
+    if spec.group in part.spec.groups or not (row.has_slopes or len(row.nodes) > len(row.cell.corners)):
+        return
+    note = describe_set(part.mesh, part.group(spec.group, f"constraint.{spec.group}.group"))
+    if note and note not in part.mesh.notes:
+        part.mesh.notes.append(note)
