@@ -105,5 +105,5 @@ def solved(data: dict[str, Any], folder: Path) -> tuple[Results, dict[str, Any],
         run(case_from_dict(data, folder), folder / "run", force=True)
     except NoEquilibrium as error:
         said = str(error)
-    told = json.loads((folder / "run" / "summary.json").read_text())
-    return open_results(folder / "run"), told, said
+    summary = json.loads((folder / "run" / "summary.json").read_text())
+    return open_results(folder / "run"), summary, said

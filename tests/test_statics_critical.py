@@ -42,11 +42,11 @@ def test_the_lowest_eigenvalue_and_mode_are_those_of_the_dense_matrix(tmp_path):
 
 
 @pytest.mark.parametrize(("unit", "axis"), [(1.0, 0), (1e-3, 2)])
-def test_a_straight_column_tells_where_it_buckles(unit, axis, tmp_path):
+def test_a_straight_column_buckles_at_euler_s_load(unit, axis, tmp_path):
     """Euler's load to 3 %: the column is a tenth as wide as long, so that it shears and shortens before."""
-    results, told, _ = solved(column(tmp_path, "3843", unit=unit, axis=axis), tmp_path)
-    (event,) = told["critical_points"]
-    assert (event["kind"], event["negative_directions"], told["status"]) == ("bifurcation", 2, "done")
+    results, summary, _ = solved(column(tmp_path, "3843", unit=unit, axis=axis), tmp_path)
+    (event,) = summary["critical_points"]
+    assert (event["kind"], event["negative_directions"], summary["status"]) == ("bifurcation", 2, "done")
     assert event["force"] == pytest.approx(-euler(), rel=0.03)
     assert event["stroke"] == pytest.approx(-0.2 * LENGTH / unit * event["pseudo_time"], rel=1e-9)
     low, high = event["between"]
@@ -61,17 +61,17 @@ def test_conjugate_gradients_find_the_same_point_as_factoring(tmp_path):
     found = []
     for petsc in ({}, {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}):
         data = column(tmp_path, "3813", counts=(10, 2, 2), statics={"steps": 10}, petsc=petsc)
-        _, told, _ = solved(data, tmp_path)
-        found.append(told["critical_points"][0])
+        _, summary, _ = solved(data, tmp_path)
+        found.append(summary["critical_points"][0])
     assert found[0]["pseudo_time"] == pytest.approx(found[1]["pseudo_time"], rel=1e-4)
     assert found[0]["negative_directions"] == found[1]["negative_directions"] == 2
 
 
 def test_a_path_may_end_at_the_bifurcation(tmp_path):
     data = column(tmp_path, "3843", statics={"steps": 5, "on_bifurcation": "stop"})
-    results, told, said = solved(data, tmp_path)
-    (event,) = told["critical_points"]
-    assert told["status"] == "stopped"
+    results, summary, said = solved(data, tmp_path)
+    (event,) = summary["critical_points"]
+    assert summary["status"] == "stopped"
     assert said.startswith("bifurcation at pseudo-time")
     assert "statics.on_bifurcation" in said
     # The last state is the last stable one.
@@ -82,8 +82,8 @@ def test_a_path_may_end_at_the_bifurcation(tmp_path):
 def test_a_path_may_take_the_stable_branch(tmp_path):
     """Buckled, the column carries about Euler's load, where the straight one would carry thirty times as much."""
     statics = {"steps": 5, "on_bifurcation": "follow"}
-    results, told, _ = solved(column(tmp_path, "3843", depth=0.12, statics=statics), tmp_path)
-    (event,) = told["critical_points"]
+    results, summary, _ = solved(column(tmp_path, "3843", depth=0.12, statics=statics), tmp_path)
+    (event,) = summary["critical_points"]
     assert event["direction"] == pytest.approx([0.0, 1.0, 0.0], abs=1e-3)
     force = -results.curve["force"][1:]
     assert ((force > 0.97 * euler(0.12)) & (force < 1.15 * euler(0.12))).all()
@@ -97,9 +97,9 @@ def test_an_ordinary_path_has_no_critical_point_and_pays_little_for_it(tmp_path,
     products = []
     times = LowestMode._times
     monkeypatch.setattr(LowestMode, "_times", lambda self, v: products.append(1) or times(self, v))
-    _, told, _ = solved(block("pvc_block_234.msh", 0.010, steps=10), tmp_path)
-    assert told["critical_points"] == []
-    assert len(products) < 0.1 * told["iterations"]["linear"]
+    _, summary, _ = solved(block("pvc_block_234.msh", 0.010, steps=10), tmp_path)
+    assert summary["critical_points"] == []
+    assert len(products) < 0.1 * summary["iterations"]["linear"]
 
 
 # --- limit points
@@ -109,8 +109,8 @@ def test_an_ordinary_path_has_no_critical_point_and_pays_little_for_it(tmp_path,
 def passed(tmp_path_factory):
     """The arch by force, along the length of its path: results, summary."""
     folder = tmp_path_factory.mktemp("arch")
-    results, told, _ = solved(arch(folder, load=0.02, steps=10, control="arc_length"), folder)
-    return results, told
+    results, summary, _ = solved(arch(folder, load=0.02, steps=10, control="arc_length"), folder)
+    return results, summary
 
 
 def test_arc_length_gives_the_curve_that_a_displacement_gives(passed, tmp_path):
@@ -124,10 +124,10 @@ def test_arc_length_gives_the_curve_that_a_displacement_gives(passed, tmp_path):
 
 
 def test_outputs_of_arc_length_are_exact_wherever_the_load_factor_passes(passed):
-    results, told = passed
+    results, summary = passed
     s = results.curve["pseudo_time"]
-    top, bottom = (event["pseudo_time"] for event in told["critical_points"])
-    assert [event["kind"] for event in told["critical_points"]] == ["limit point", "limit point"]
+    top, bottom = (event["pseudo_time"] for event in summary["critical_points"])
+    assert [event["kind"] for event in summary["critical_points"]] == ["limit point", "limit point"]
     wanted = [0, *(k / 10 for k in range(1, 5)), top, 0.4, 0.3, bottom, *(k / 10 for k in range(3, 11))]
     assert s.tolist() == wanted
     assert results.curve["force"] == pytest.approx(0.02 * s, rel=1e-8)
@@ -137,8 +137,8 @@ def test_outputs_of_arc_length_are_exact_wherever_the_load_factor_passes(passed)
 
 
 def test_a_path_by_force_names_the_limit_point_it_ends_at(passed, tmp_path):
-    _, told, said = solved(arch(tmp_path, load=0.02, steps=10), tmp_path)
-    (event,) = told["critical_points"]
+    _, summary, said = solved(arch(tmp_path, load=0.02, steps=10), tmp_path)
+    (event,) = summary["critical_points"]
     assert event["kind"] == "limit point"
     assert event["pseudo_time"] == pytest.approx(passed[1]["critical_points"][0]["pseudo_time"], rel=1e-4)
     assert "limit point" in said
@@ -193,16 +193,18 @@ def test_branches_and_turns_are_the_same_on_any_number_of_ranks(tmp_path, mpirun
     for name in cases:
         folders = [tmp_path / f"on{ranks}" / name for ranks in (1, 2, 3)]
         one, *others = (open_results(folder) for folder in folders)
-        told = [json.loads((folder / "summary.json").read_text())["critical_points"] for folder in folders]
-        for other, points in zip(others, told[1:], strict=True):
+        summaries = [
+            json.loads((folder / "summary.json").read_text())["critical_points"] for folder in folders
+        ]
+        for other, points in zip(others, summaries[1:], strict=True):
             for column_name in ("pseudo_time", "force", "stroke", "strain_energy"):
                 wanted = one.curve[column_name]
                 # Critical points are found to 1e-4 of their pseudo-time, and are rows of the arch's table.
                 np.testing.assert_allclose(
                     other.curve[column_name], wanted, rtol=0, atol=1e-6 * np.abs(wanted).max()
                 )
-            assert [point["kind"] for point in points] == [point["kind"] for point in told[0]]
-            for point, known in zip(points, told[0], strict=True):
+            assert [point["kind"] for point in points] == [point["kind"] for point in summaries[0]]
+            for point, known in zip(points, summaries[0], strict=True):
                 assert point["place"] == pytest.approx(known["place"])
                 assert point["direction"] == pytest.approx(known["direction"], abs=1e-3)
                 assert point["pseudo_time"] == pytest.approx(known["pseudo_time"], rel=1e-4)

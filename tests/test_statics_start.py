@@ -50,11 +50,11 @@ def test_work_of_a_load_that_is_there_from_the_start(tmp_path):
     data["constraint"] = data["constraint"][:1]
     data["output"] = {}
     data["load"] = [{"type": "force", "group": "top", "total": [0.05, 0.0, -0.1], "ramp": "constant"}]
-    results, told, _ = solved(data, tmp_path)
+    results, summary, _ = solved(data, tmp_path)
     energy = results.curve["strain_energy"]
     assert energy[1:] == pytest.approx(energy[1] * np.ones(5), rel=1e-9)
     assert results.curve["external_work"][1:] == pytest.approx(energy[1:], rel=1e-4)
-    assert told["critical_points"] == []
+    assert summary["critical_points"] == []
 
 
 def test_strokes_are_reached_in_both_directions_and_rounding_makes_no_second_output(tmp_path):
@@ -94,13 +94,13 @@ def test_work_along_the_length_of_a_path_that_turns_back():
 
 
 def test_a_law_beyond_its_limit_is_warned_of(tmp_path):
-    _, told, _ = solved(pressed(tmp_path, "linear", law="svk", stroke=0.44), tmp_path)
-    assert told["status"] == "done"
-    assert "svk carries the less" in told["doubts"]
-    assert "48 elements" in told["doubts"]
-    assert told["doubts"] in (tmp_path / "run" / "log.txt").read_text()
-    _, told, _ = solved(pressed(tmp_path, "linear", law="svk", stroke=0.1), tmp_path)
-    assert told["doubts"] is None
+    _, summary, _ = solved(pressed(tmp_path, "linear", law="svk", stroke=0.44), tmp_path)
+    assert summary["status"] == "done"
+    assert "svk carries the less" in summary["doubts"]
+    assert "48 elements" in summary["doubts"]
+    assert summary["doubts"] in (tmp_path / "run" / "log.txt").read_text()
+    _, summary, _ = solved(pressed(tmp_path, "linear", law="svk", stroke=0.1), tmp_path)
+    assert summary["doubts"] is None
 
 
 # --- line searches
@@ -113,9 +113,9 @@ def test_a_leaning_column_is_followed_far_beyond_euler_s_load(tmp_path):
     data["constraint"] = data["constraint"][:1]
     free = euler() / 4
     data["load"] = [{"type": "force", "group": "head", "total": [-2 * free, 3e-3 * free, 0.0]}]
-    results, told, _ = solved(data, tmp_path)
-    assert (told["status"], told["critical_points"]) == ("done", [])
-    assert told["iterations"]["newton"] < 150
+    results, summary, _ = solved(data, tmp_path)
+    assert (summary["status"], summary["critical_points"]) == ("done", [])
+    assert summary["iterations"]["newton"] < 150
     # The elastica under twice Euler's load: K. Mattiasson's elliptic integrals for P L^2 / (E I) = pi^2 / 2, a slender column.
     assert results.probes["head.uy"][-1] == pytest.approx(0.79, abs=0.03)
 

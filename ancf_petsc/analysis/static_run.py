@@ -26,7 +26,7 @@ from ancf_petsc.solve.stability import beyond_the_law
 
 log = logging.getLogger(STEPS)
 RISE = tuple(k / 10 for k in range(1, 11))
-"""Where the way to loads that do not begin at 0 stops for the sum of its work."""
+"""States at which the work is summed up while loads that do not begin at 0 come up."""
 
 
 class StaticRun:

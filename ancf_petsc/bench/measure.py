@@ -25,6 +25,7 @@ from ancf_petsc.analysis.statics import StaticAnalysis
 from ancf_petsc.bench.alternatives import mass_solver, reader
 from ancf_petsc.bench.elements import compile_catalogue, points
 from ancf_petsc.bench.kernels import residual, tangent
+from ancf_petsc.bench.line_search import line_search
 from ancf_petsc.bench.meshes import mesh_path
 from ancf_petsc.bench.messages import exchange_cost, messages
 from ancf_petsc.bench.problems import PROBLEMS, block, block_force_234, reference_tip
@@ -234,6 +235,7 @@ MEASUREMENTS: dict[str, Callable[..., Result]] = {
     "iterations": iterations,
     "mass_solver": mass_solver,
     "reader": reader,
+    "line_search": line_search,
     "messages": messages,
     "exchange_cost": exchange_cost,
 }

@@ -12,15 +12,16 @@ from ancf_petsc.mesh.generate import make_mesh
 
 PROJECT = Path(ancf_petsc.__file__).resolve().parent.parent
 MADE = re.compile(
-    r"(?P<body>[a-z_]+):(?P<how>[0-9.]+|\d+x\d+x\d+)(?P<more>:hexahedra|:quadratic)?(:rim=(?P<rim>[0-9.]+))?"
+    r"(?P<body>[a-z_]+):(?P<how>[0-9.]+|\d+x\d+x\d+)(?P<more>:hexahedra|:quadratic|:line)?"
+    r"(:rim=(?P<rim>[0-9.]+))?"
 )
 
 
 def mesh_path(name: str) -> Path:
     """The file of a mesh: "cube_m2" is the project's; "cube:0.0025" (size), "cube:4x4x8" (bricks) are made.
 
-    ":hexahedra" leaves bricks whole, ":quadratic" adds mid-nodes, ":rim=0.001" at the end grades towards
-    rims with edges of that length there.
+    ":hexahedra" leaves bricks whole, ":line" keeps the axis alone, ":quadratic" adds mid-nodes, ":rim=0.001" at the end
+    grades towards rims with edges of that length there.
     """
     made = MADE.fullmatch(name)
     if made is None:
@@ -43,6 +44,7 @@ def _make(made: re.Match[str], place: Path) -> None:
         divisions=[int(count) for count in made["how"].split("x")] if bricks else None,
         order=2 if made["more"] == ":quadratic" else 1,
         hexahedra=made["more"] == ":hexahedra",
+        flat="line" if made["more"] == ":line" else "",
     )
     draft.replace(place)
 

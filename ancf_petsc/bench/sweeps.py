@@ -232,4 +232,35 @@ def _alternatives() -> list[Row]:
     return [*solvers, *masses, *motions, *readers]
 
 
-SWEEPS = [*_points(), *_accuracy(), *_strokes(), *_iterations(), *_scaling(), *_alternatives()]
+SEARCHES = ("program", "bt", "cp", "l2", "energy")
+SEARCHED = (
+    *("column/1222", "column/3843", "column/3-10-1-3", "arch/3-10-1-3"),
+    *("block/3413", "block/3-10-1-3", "pad_0.499/3-10-1-3", "pad_0.499/3413"),
+)
+
+
+def _line_searches() -> list[Row]:
+    """What the program does, whole steps and then bt, and PETSc's line searches beside it."""
+    return [
+        Row(
+            f"line_search/{problem}/{search}",
+            f"Newton iterations of a load path by {search}, failed steps included",
+            "line_search",
+            {"problem": problem, "search": search},
+            unit="iterations",
+            repetitions=1,
+        )
+        for problem in SEARCHED
+        for search in SEARCHES
+    ]
+
+
+SWEEPS = [
+    *_points(),
+    *_accuracy(),
+    *_strokes(),
+    *_iterations(),
+    *_line_searches(),
+    *_scaling(),
+    *_alternatives(),
+]

@@ -128,7 +128,7 @@ class Watch:
 
     def find_mode(self, x: PETSc.Vec) -> None:
         """The lowest mode at x, near a critical point. Of several with eigenvalues near 0 the same on any number of ranks: a
-        shift hides how rounding tells them apart.
+        shift is large beside the differences that rounding makes between them.
         """
         lowest = self.lowest
         lowest.restart()

@@ -25,8 +25,8 @@ def stable_neighbour(newton: Newton, watch: Watch, s: float, x: PETSc.Vec, mode:
     """Bring x from near an unstable equilibrium at s to a stable one. Returns its lowest eigenvalue; None if there is
     none within reach, and x is garbage then. mode (n, 3): with the sign to go. Collective.
     """
-    hill = _Hill(newton, s)
-    hill.push(x, mode)
+    potential = _Potential(newton, s)
+    potential.follow_mode(x, mode)
     for _ in range(MOST_ITERATIONS):
         residual, relative = newton.residual_at(x)
         newton.tangent_at(x)
@@ -35,11 +35,11 @@ def stable_neighbour(newton: Newton, watch: Watch, s: float, x: PETSc.Vec, mode:
         if watch.count(value) == 0 and relative <= newton.tolerance:
             return value
         if not definite and relative < FLAT:
-            hill.push(x, watch.lowest.mode)
+            potential.follow_mode(x, watch.lowest.mode)
             continue
         if not definite and not _make_definite(newton, watch, x, value):
             return None
-        if not hill.step(x, residual):
+        if not potential.step(x, residual):
             return None
     return None
 
@@ -55,7 +55,7 @@ def _make_definite(newton: Newton, watch: Watch, x: PETSc.Vec, value: float) -> 
     return False
 
 
-class _Hill:
+class _Potential:
     """The potential energy at pseudo-time s."""
 
     def __init__(self, newton: Newton, s: float) -> None:
@@ -71,7 +71,7 @@ class _Hill:
         moved = x.array_r.reshape(-1, 3) - model.reference[: model.owned]
         return self.assembly.strain_energy(x) - combined(comm, float(np.vdot(self._load, moved)))
 
-    def push(self, x: PETSc.Vec, mode: NDArray) -> None:
+    def follow_mode(self, x: PETSc.Vec, mode: NDArray) -> None:
         """Move x along the mode (n, 3) as far as the energy falls, in steps that double."""
         comm, model = self.assembly.comm, self.assembly.model
         largest = max(comm.allgather(float(np.abs(mode).max(initial=0.0))))

@@ -63,7 +63,7 @@ def beyond_the_law(assembly: Assembly, x: PETSc.Vec) -> str | None:
             f"{beyond} of {total} elements are pressed so far that {law} carries the less the more they are pressed: {worst}; "
             f"forces depend on the mesh there: {_laws_without_limit()} has no such limit"
         )
-    return f"{crushed} of {total} elements are crushed below {CRUSHED:g} of their volume: {worst}; a finer mesh there tells more"
+    return f"{crushed} of {total} elements are crushed below {CRUSHED:g} of their volume: {worst}; take a finer mesh there"
 
 
 def _stretches(assembly: Assembly, x: PETSc.Vec) -> tuple[np.ndarray, np.ndarray]:
