@@ -150,7 +150,7 @@ except EnvironmentProblem as error:
 @pytest.mark.parametrize(("ranks", "reserve", "way"), [(2, "not", "parallel"), (3, "not", "gathered")])
 def test_all_ranks_say_the_same_and_end(ranks, reserve, way, mpirun, tmp_path):
     """Neither a hang nor a crash at the end, where HDF5 closes what is open."""
-    mpirun(ranks, ["-c", FULL, tmp_path, reserve, way], timeout=60)
+    mpirun(ranks, ["-c", FULL, tmp_path, reserve, way], timeout=240)
     said = {(tmp_path / f"said_{rank}").read_text() for rank in range(ranks)}
     assert len(said) == 1
     step, _, words = said.pop().partition(" ")
@@ -284,7 +284,7 @@ def test_a_full_disk_ends_all_ranks(mpirun, project, tmp_path):
     code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (450_000, -1))\n"
     code += "from ancf_petsc.cli import main; sys.exit(main(sys.argv[1:]))"
     words = ["run", project / "cases/pvc_block", "--out", tmp_path / "run", "--set", "statics.steps=4"]
-    done = mpirun(3, ["-c", code, *words, "--quiet"], code=4)
+    done = mpirun(3, ["-c", code, *words, "--quiet"], code=4, timeout=300)
     assert done.stderr.count("error: ") == 1
     assert "Traceback" not in done.stderr
     assert len(open_results(tmp_path / "run").times) > 0
