@@ -3,32 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ancf_petsc.mesh.abaqus import generate, place
 from ancf_petsc.mesh.abaqus.data import Line, fields, label, numbered, records, rows, table, whole, words
-from ancf_petsc.mesh.abaqus.deck import Card
+from ancf_petsc.mesh.abaqus.deck import KeywordCard
 from ancf_petsc.mesh.abaqus.scope import (
     Elements,
     Listed,
     Member,
     Nodes,
     Range,
+    Reader,
     Reference,
     Surface,
     SurfaceLine,
 )
 from ancf_petsc.mesh.abaqus.types import element_type
 
-if TYPE_CHECKING:
-    from ancf_petsc.mesh.abaqus.file import Reader
-
 WHOLE_NUMBERS = str.maketrans("", "", "0123456789, \t\n")
 
 
-def node(reader: Reader, card: Card) -> None:
+def node(reader: Reader, card: KeywordCard) -> None:
     given = card.known("NSET", "SYSTEM", ignored=("INPUT",))
     if not card.text().strip():
         return
@@ -41,7 +38,7 @@ def node(reader: Reader, card: Card) -> None:
         scope.add("node", label(given["NSET"]), [Listed(numbers)])
 
 
-def element(reader: Reader, card: Card) -> None:
+def element(reader: Reader, card: KeywordCard) -> None:
     given = card.known("TYPE", "ELSET", ignored=("INPUT",))
     title = "".join(card.needed(given, "TYPE").replace('"', "").split()).upper()
     kind = element_type(title)
@@ -74,14 +71,14 @@ def _nodes_of(kind: str) -> int:
     return KINDS[kind].nodes
 
 
-def _first_numbers(card: Card) -> np.ndarray:
+def _first_numbers(card: KeywordCard) -> np.ndarray:
     """Element numbers of springs and the like, one a line."""
     flat, counts = table(card)
     starts = np.cumsum(counts) - counts
     return numbered(card, whole(card, flat[starts]), "an element")
 
 
-def node_set(reader: Reader, card: Card) -> None:
+def node_set(reader: Reader, card: KeywordCard) -> None:
     given = card.known(
         *("NSET", "GENERATE", "ELSET", "INSTANCE", "UNSORTED"), ignored=("INTERNAL", "INPUT", "DMINFORMATION")
     )
@@ -96,7 +93,7 @@ def node_set(reader: Reader, card: Card) -> None:
     reader.scope.sets["node"][name.key].unsorted |= "UNSORTED" in given
 
 
-def element_set(reader: Reader, card: Card) -> None:
+def element_set(reader: Reader, card: KeywordCard) -> None:
     given = card.known(
         "ELSET", "GENERATE", "INSTANCE", ignored=("INTERNAL", "UNSORTED", "INPUT", "DMINFORMATION")
     )
@@ -104,7 +101,7 @@ def element_set(reader: Reader, card: Card) -> None:
     reader.scope.add("element", name, _members(reader, card, given, "element"))
 
 
-def _instance(reader: Reader, card: Card, given: dict[str, str]) -> str:
+def _instance(reader: Reader, card: KeywordCard, given: dict[str, str]) -> str:
     if "INSTANCE" not in given:
         return ""
     key = label(card.needed(given, "INSTANCE")).key
@@ -118,7 +115,7 @@ def _instance(reader: Reader, card: Card, given: dict[str, str]) -> str:
     return key
 
 
-def _members(reader: Reader, card: Card, given: dict[str, str], what: str) -> list[Member]:
+def _members(reader: Reader, card: KeywordCard, given: dict[str, str], what: str) -> list[Member]:
     """Members of a set; a set that is named takes in what that set holds so far."""
     owner = _instance(reader, card, given)
     if "GENERATE" in given:
@@ -139,7 +136,7 @@ def _members(reader: Reader, card: Card, given: dict[str, str], what: str) -> li
     return members
 
 
-def _named(reader: Reader, card: Card, line: Line, word: str, owner: str, what: str) -> list[Member]:
+def _named(reader: Reader, card: KeywordCard, line: Line, word: str, owner: str, what: str) -> list[Member]:
     """A set by its name, or INSTANCE.name, or INSTANCE.number."""
     if word.lstrip("+-").replace(".", "").isdecimal():
         raise card.error(
@@ -162,7 +159,7 @@ def split_name(reader: Reader, word: str):
     return label(word), "", None
 
 
-def _ranges(card: Card, owner: str, what: str) -> list[Member]:
+def _ranges(card: KeywordCard, owner: str, what: str) -> list[Member]:
     members: list[Member] = []
     for line, text in card.lines():
         own = [word for word in fields(text) if word]
@@ -179,7 +176,7 @@ def _ranges(card: Card, owner: str, what: str) -> list[Member]:
     return members
 
 
-def surface(reader: Reader, card: Card) -> None:
+def surface(reader: Reader, card: KeywordCard) -> None:
     given = card.known(
         *("NAME", "TYPE", "COMBINE"),
         ignored=(
@@ -216,13 +213,13 @@ def surface(reader: Reader, card: Card) -> None:
         found.lines.append(SurfaceLine(word, "" if kind == "NODE" else label(face).key, line))
 
 
-def refused(reader: Reader, card: Card) -> None:
+def refused(reader: Reader, card: KeywordCard) -> None:
     raise card.error(
         "changes the mesh and is not read", cure="write the deck with the mesh as it is after it"
     )
 
 
-HANDLERS: dict[str, Callable[[Reader, Card], None]] = {
+HANDLERS: dict[str, Callable[[Reader, KeywordCard], None]] = {
     "NODE": node,
     "ELEMENT": element,
     "NSET": node_set,

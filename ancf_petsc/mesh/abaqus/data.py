@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ancf_petsc.errors import MeshError
-from ancf_petsc.mesh.abaqus.deck import Card
+from ancf_petsc.mesh.abaqus.deck import KeywordCard
 from ancf_petsc.mesh.mesh import Floats, Integers
 
 QUOTED = re.compile(r'(?:"[^"]*"|[^,"\n])+')
@@ -37,19 +37,19 @@ def label(word: str) -> Label:
     return Label(word.upper(), word)
 
 
-class Table(NamedTuple):
+class DataRows(NamedTuple):
     """Numbers of data lines. flat: all of them, an empty field being 0; counts: fields of each line."""
 
     flat: Floats
     counts: Integers
 
 
-def table(card: Card) -> Table:
+def table(card: KeywordCard) -> DataRows:
     """The numbers of all data lines that hold some. Raises MeshError with the line that holds anything else."""
     text = re.sub(r"[ \t\f\v]+", "", card.text()).translate(FORTRAN)
     text = re.sub(r",?\n+", "\n", text + "\n").strip("\n")
     if not text:
-        return Table(np.empty(0), np.empty(0, dtype=np.int64))
+        return DataRows(np.empty(0), np.empty(0, dtype=np.int64))
     if text.translate(NUMERIC):
         raise _not_numbers(card)
     codes = np.frombuffer(text.encode("ascii"), dtype=np.uint8)
@@ -67,10 +67,10 @@ def table(card: Card) -> Table:
             raise _not_numbers(card) from None
     if len(flat) != counts.sum() or not (np.abs(flat) < LARGEST).all():
         raise _not_numbers(card)
-    return Table(flat, counts)
+    return DataRows(flat, counts)
 
 
-def _not_numbers(card: Card) -> MeshError:
+def _not_numbers(card: KeywordCard) -> MeshError:
     for line, text in card.lines():
         for word in text.translate(FORTRAN).split(","):
             word = "".join(word.split())
@@ -86,7 +86,7 @@ def _not_numbers(card: Card) -> MeshError:
     return card.error("the data lines are not numbers", cure="mend the deck")
 
 
-def rows(card: Card, width: int) -> Floats:
+def rows(card: KeywordCard, width: int) -> Floats:
     """Numbers (lines, width); what a line does not give is 0, what it gives beyond is left out."""
     flat, counts = table(card)
     if not len(counts):
@@ -100,7 +100,7 @@ def rows(card: Card, width: int) -> Floats:
     return np.pad(full, ((0, 0), (0, width - full.shape[1])))
 
 
-def records(card: Card, width: int, what: str) -> Integers:
+def records(card: KeywordCard, width: int, what: str) -> Integers:
     """Whole numbers (records, width). A record begins with a line and may go on over several."""
     flat, counts = table(card)
     numbers = whole(card, flat)
@@ -111,7 +111,7 @@ def records(card: Card, width: int, what: str) -> Integers:
     raise _broken_record(card, width, what, ends)
 
 
-def _broken_record(card: Card, width: int, what: str, ends: Integers) -> MeshError:
+def _broken_record(card: KeywordCard, width: int, what: str, ends: Integers) -> MeshError:
     """The first record that does not end with a line."""
     lines = list(card.lines())
     lines = [(line, text) for line, text in lines if text.strip(", \t")]
@@ -133,7 +133,7 @@ def _broken_record(card: Card, width: int, what: str, ends: Integers) -> MeshErr
     return card.error(f"records of {what} are broken", cure="mend the deck")
 
 
-def whole(card: Card, numbers: Floats) -> Integers:
+def whole(card: KeywordCard, numbers: Floats) -> Integers:
     """The same as integers."""
     if ((numbers != np.floor(numbers)) | (np.abs(numbers) > LARGEST_NUMBER)).any():
         found = numbers[(numbers != np.floor(numbers)) | (np.abs(numbers) > LARGEST_NUMBER)][0]
@@ -151,7 +151,7 @@ def _is(word: str, number: float) -> bool:
         return False
 
 
-def numbered(card: Card, numbers: Integers, what: str) -> Integers:
+def numbered(card: KeywordCard, numbers: Integers, what: str) -> Integers:
     """Numbers of nodes or elements, which are positive."""
     if len(numbers) and numbers.min() < 1:
         raise card.error(

@@ -33,7 +33,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Span:
+class Piece:
     """A piece of a file that holds data lines."""
 
     source: Source
@@ -46,7 +46,7 @@ class Span:
 
 
 @dataclass
-class Card:
+class KeywordCard:
     """A keyword with its parameters and data.
 
     name: in capitals without blanks, such as "ENDPART". parameters: name in capitals -> value as it stands, "" without one.
@@ -56,7 +56,7 @@ class Card:
     parameters: dict[str, str]
     source: Source
     position: int
-    spans: list[Span] = field(default_factory=list)
+    spans: list[Piece] = field(default_factory=list)
 
     def error(
         self, problem: str, *, line: tuple[Path, int] | None = None, cure: str | None = None, **facts
@@ -99,7 +99,7 @@ class Card:
         return found[name]
 
 
-def read_cards(path: Path, notes: list[str]) -> list[Card]:
+def read_cards(path: Path, notes: list[str]) -> list[KeywordCard]:
     """All cards of a deck, those of included files in their place. Raises MeshError."""
     return list(_Deck(path, notes).cards())
 
@@ -109,10 +109,10 @@ class _Deck:
         self.path = path
         self.notes = notes
 
-    def cards(self) -> Iterator[Card]:
-        current: Card | None = None
+    def cards(self) -> Iterator[KeywordCard]:
+        current: KeywordCard | None = None
         for item in self._items(self._load(self.path), ()):
-            if isinstance(item, Card):
+            if isinstance(item, KeywordCard):
                 if current:
                     yield current
                 current = item
@@ -144,14 +144,14 @@ class _Deck:
             ) from None
         return Source(path, as_text(data, path, self.notes).replace("\r\n", "\n").replace("\r", "\n"))
 
-    def _items(self, source: Source, above: tuple[Path, ...]) -> Iterator[Card | Span]:
+    def _items(self, source: Source, above: tuple[Path, ...]) -> Iterator[KeywordCard | Piece]:
         """Cards without data, and spans of data lines, in the order of the deck."""
         text, at = source.text, 0
         for mark in STAR.finditer(text):
             if mark.start() < at:  # a continuation of a keyword line took it
                 continue
             if mark.start() > at:
-                yield Span(source, at, mark.start())
+                yield Piece(source, at, mark.start())
             at = min(mark.end() + 1, len(text))
             if mark[0].lstrip().startswith("**"):
                 continue
@@ -168,11 +168,11 @@ class _Deck:
             else:
                 yield card
         if at < len(text):
-            yield Span(source, at, len(text))
+            yield Piece(source, at, len(text))
 
-    def _card(self, header: str, source: Source, position: int) -> Card:
+    def _card(self, header: str, source: Source, position: int) -> KeywordCard:
         name, _, rest = header.lstrip("*").partition(",")
-        card = Card("".join(name.split()).upper(), {}, source, position)
+        card = KeywordCard("".join(name.split()).upper(), {}, source, position)
         at = 0
         while at < len(rest):
             found = PARAMETER.match(rest, at)
@@ -185,13 +185,15 @@ class _Deck:
             at = max(found.end(), at + 1)
         return card
 
-    def _included(self, card: Card, target: Path, above: tuple[Path, ...]) -> Iterator[Card | Span]:
+    def _included(
+        self, card: KeywordCard, target: Path, above: tuple[Path, ...]
+    ) -> Iterator[KeywordCard | Piece]:
         resolved = target.resolve()
         if resolved in [path.resolve() for path in above] or len(above) > DEEPEST:
             raise card.error(f"{target} includes itself", cure="take the *INCLUDE out")
         yield from self._items(self._load(target), above)
 
-    def _target(self, card: Card, value: str) -> Path:
+    def _target(self, card: KeywordCard, value: str) -> Path:
         """The file of INPUT=: beside the file that names it, else beside the deck."""
         name = value.strip().strip('"').strip()
         if "\0" not in name and name:
@@ -205,7 +207,7 @@ class _Deck:
             cure="put it there",
         )
 
-    def _take_input(self, card: Card) -> None:
+    def _take_input(self, card: KeywordCard) -> None:
         """Data lines of INPUT= of nodes, elements and sets."""
         value = card.parameters.get("INPUT")
         if value is None or card.name not in ("NODE", "ELEMENT", "NSET", "ELSET"):
@@ -216,6 +218,6 @@ class _Deck:
                 raise card.error(
                     "the file of INPUT= holds keywords", got=mark[0][:40], expected="data lines only"
                 )
-            card.spans.append(Span(source, at, mark.start()))
+            card.spans.append(Piece(source, at, mark.start()))
             at = mark.end()
-        card.spans.append(Span(source, at, len(source.text)))
+        card.spans.append(Piece(source, at, len(source.text)))

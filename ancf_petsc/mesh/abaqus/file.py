@@ -10,38 +10,22 @@ from pathlib import Path
 import numpy as np
 
 from ancf_petsc.mesh.abaqus.cards import HANDLERS, HARMLESS, MECHANICS
-from ancf_petsc.mesh.abaqus.deck import Card, read_cards
+from ancf_petsc.mesh.abaqus.deck import KeywordCard, read_cards
 from ancf_petsc.mesh.abaqus.groups import name_groups
-from ancf_petsc.mesh.abaqus.scope import Instance, Model, Scope
+from ancf_petsc.mesh.abaqus.scope import Deck, Instance, Reader
 from ancf_petsc.mesh.abaqus.sets import Resolver
 from ancf_petsc.mesh.abaqus.types import AXISYMMETRIC, SKIN
 from ancf_petsc.mesh.mesh import Integers
 from ancf_petsc.mesh.raw import Block, RawMesh
 
 
-class Reader:
-    """What the cards so far have said. scope: where nodes, elements and sets are entered.
-
-    open_instance: key of the instance that is being read, and its part. beyond: elements that are no cells, by type.
-    """
-
-    def __init__(self) -> None:
-        self.assembly = self.scope = Scope()
-        self.parts: dict[str, Scope] = {}
-        self.instances: dict[str, Instance] = {}
-        self.open_instance: tuple[str, Scope] | None = None
-        self.has_assembly = False
-        self.used_parts: set[str] = set()
-        self.beyond: dict[str, int] = {}
-        self.refused: dict[str, str] = {}
-        self.skipped: dict[str, str] = {}
-
-    def take(self, card: Card) -> None:
-        handler = HANDLERS.get(card.name)
-        if handler:
-            handler(self, card)
-        elif card.name not in HARMLESS:
-            self.skipped.setdefault(card.name, card.name)
+def _take(reader: Reader, card: KeywordCard) -> None:
+    """Enter what a card says, or note that it was skipped."""
+    handler = HANDLERS.get(card.name)
+    if handler:
+        handler(reader, card)
+    elif card.name not in HARMLESS:
+        reader.skipped.setdefault(card.name, card.name)
 
 
 def read_abaqus(path: Path) -> RawMesh:
@@ -50,13 +34,13 @@ def read_abaqus(path: Path) -> RawMesh:
     reader = Reader()
     cards = read_cards(path, notes)
     for card in cards:
-        reader.take(card)
+        _take(reader, card)
     if reader.scope is not reader.assembly:
         raise cards[-1].error(
             f"the deck ends within {reader.scope.name!r}", cure="end it by *END PART or *END INSTANCE"
         )
     notes += _skipped(reader)
-    model = Model(reader.assembly, _placed(reader, notes), notes)
+    model = Deck(reader.assembly, _placed(reader, notes), notes)
     return _raw(model, reader)
 
 
@@ -106,7 +90,7 @@ class Offsets:
     by[what][key]: of nodes and elements.
     """
 
-    def __init__(self, model: Model, resolver: Resolver) -> None:
+    def __init__(self, model: Deck, resolver: Resolver) -> None:
         self.by: dict[str, dict[str, int]] = {"node": {}, "element": {}}
         for what, offsets in self.by.items():
             highest = {}
@@ -120,7 +104,7 @@ class Offsets:
             for key in model.instances:
                 offsets.setdefault(key, 0)
 
-    def note(self, model: Model) -> list[str]:
+    def note(self, model: Deck) -> list[str]:
         added = [
             f"{offset} to those of {model.instances[key].shown or 'the assembly'}"
             for key, offset in self.by["node"].items()
@@ -129,7 +113,7 @@ class Offsets:
         return [f"instances number their nodes alike: added {', '.join(added)}"] if added else []
 
 
-def _raw(model: Model, reader: Reader) -> RawMesh:
+def _raw(model: Deck, reader: Reader) -> RawMesh:
     resolver = Resolver(model.instances, model.assembly)
     offsets = Offsets(model, resolver)
     numbers: list[Integers] = [np.empty(0, dtype=np.int64)]

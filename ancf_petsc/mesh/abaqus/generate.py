@@ -5,25 +5,20 @@ Source: Abaqus Analysis User's Guide, "Node definition" and "Element definition"
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ancf_petsc.mesh.abaqus.data import Line, fields, label, words
-from ancf_petsc.mesh.abaqus.deck import Card
+from ancf_petsc.mesh.abaqus.deck import KeywordCard
 from ancf_petsc.mesh.abaqus.place import motion
-from ancf_petsc.mesh.abaqus.scope import Elements, Listed, Nodes
+from ancf_petsc.mesh.abaqus.scope import Elements, Listed, Nodes, Reader
 from ancf_petsc.mesh.abaqus.sets import of_set
 from ancf_petsc.mesh.mesh import Floats, Integers
-
-if TYPE_CHECKING:
-    from ancf_petsc.mesh.abaqus.file import Reader
 
 MOST = 50_000_000
 """Nodes or elements that one card may make: more is a slip of the pen."""
 
 
-def _whole_fields(card: Card, line: Line, text: str, least: int, most: int) -> list[int]:
+def _whole_fields(card: KeywordCard, line: Line, text: str, least: int, most: int) -> list[int]:
     """The whole numbers of a data line; empty fields are 0."""
     found = fields(text)
     while found and not found[-1]:
@@ -39,12 +34,12 @@ def _whole_fields(card: Card, line: Line, text: str, least: int, most: int) -> l
     return numbers
 
 
-def _limit(card: Card, count: int) -> None:
+def _limit(card: KeywordCard, count: int) -> None:
     if count > MOST:
         raise card.error("makes more nodes or elements than fit", got=count, expected=f"at most {MOST}")
 
 
-def _places(reader: Reader, card: Card, numbers: Integers) -> Floats:
+def _places(reader: Reader, card: KeywordCard, numbers: Integers) -> Floats:
     """Points (n, 3) of nodes that are there."""
     known, points = reader.scope.node_table()
     place = np.minimum(np.searchsorted(known, numbers), max(len(known) - 1, 0))
@@ -54,7 +49,7 @@ def _places(reader: Reader, card: Card, numbers: Integers) -> Floats:
     return points[place]
 
 
-def nodes_between(reader: Reader, card: Card) -> None:
+def nodes_between(reader: Reader, card: KeywordCard) -> None:
     """*NGEN: nodes at equal distances on the straight line from one node to another."""
     given = card.known("NSET", "LINE", "SYSTEM")
     if label(given.get("LINE", "")).key not in ("", "S"):
@@ -80,7 +75,7 @@ def nodes_between(reader: Reader, card: Card) -> None:
         reader.scope.add("node", label(given["NSET"]), [Listed(np.concatenate(every))])
 
 
-def fill(reader: Reader, card: Card) -> None:
+def fill(reader: Reader, card: KeywordCard) -> None:
     """*NFILL: nodes at equal distances on the straight lines between nodes of two sets, taken in ascending order."""
     given = card.known("NSET")
     every = []
@@ -110,7 +105,7 @@ def fill(reader: Reader, card: Card) -> None:
         reader.scope.add("node", label(given["NSET"]), [Listed(np.unique(np.concatenate(every)))])
 
 
-def copy_nodes(reader: Reader, card: Card) -> None:
+def copy_nodes(reader: Reader, card: KeywordCard) -> None:
     """*NCOPY, SHIFT: a set of nodes again, moved and turned, its numbers raised."""
     given = card.known("CHANGENUMBER", "OLDSET", "NEWSET", "SHIFT", "MULTIPLE")
     if "SHIFT" not in given:
@@ -130,14 +125,14 @@ def copy_nodes(reader: Reader, card: Card) -> None:
         reader.scope.add("node", label(given["NEWSET"]), [Listed(np.concatenate(new))])
 
 
-def _number(card: Card, given: dict[str, str], name: str) -> int:
+def _number(card: KeywordCard, given: dict[str, str], name: str) -> int:
     value = card.needed(given, name).strip()
     if not (value.isdecimal() and value.isascii()) or int(value) < 1:
         raise card.error(f"{name}=", got=value, expected="a whole number, 1 or more")
     return int(value)
 
 
-def elements(reader: Reader, card: Card) -> None:
+def elements(reader: Reader, card: KeywordCard) -> None:
     """*ELGEN: rows, columns and layers of elements like one that is there."""
     given = card.known("ELSET")
     made = []
@@ -159,7 +154,7 @@ def elements(reader: Reader, card: Card) -> None:
         reader.scope.add("element", label(given["ELSET"]), [Listed(np.concatenate(made))])
 
 
-def _find(reader: Reader, card: Card, number: int, line: Line) -> tuple[Elements, int]:
+def _find(reader: Reader, card: KeywordCard, number: int, line: Line) -> tuple[Elements, int]:
     for block in reader.scope.elements:
         found = np.flatnonzero(block.numbers == number)
         if len(found):
@@ -167,7 +162,7 @@ def _find(reader: Reader, card: Card, number: int, line: Line) -> tuple[Elements
     raise card.error(f"element {number} is not there yet", line=line, cure="give the element before it")
 
 
-def copy_elements(reader: Reader, card: Card) -> None:
+def copy_elements(reader: Reader, card: KeywordCard) -> None:
     """*ELCOPY: a set of elements again, their numbers and those of their nodes raised."""
     given = card.known("ELEMENTSHIFT", "OLDSET", "SHIFTNODES", "NEWSET")
     if words(card.text()):

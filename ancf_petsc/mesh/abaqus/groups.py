@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ancf_petsc.mesh.abaqus.data import Label, label
-from ancf_petsc.mesh.abaqus.scope import Elements, Instance, Model, Scope, Surface, SurfaceLine
+from ancf_petsc.mesh.abaqus.scope import Deck, Elements, Instance, Scope, Surface, SurfaceLine
 from ancf_petsc.mesh.abaqus.sets import Resolver
 from ancf_petsc.mesh.abaqus.types import FACES, PLANE, SKIN, SOLID
 from ancf_petsc.mesh.kinds import KINDS
@@ -19,7 +19,7 @@ from ancf_petsc.mesh.raw import Block, RawMesh
 Offsets = dict[str, dict[str, int]]
 
 
-def name_groups(raw: RawMesh, model: Model, resolver: Resolver, offsets: Offsets) -> None:
+def name_groups(raw: RawMesh, model: Deck, resolver: Resolver, offsets: Offsets) -> None:
     """Enter node sets, element sets and surfaces into `raw`, under the names a case may use.
 
     A set of the assembly has its name; one of a part INSTANCE.name, and its name alone where nothing else has it.
@@ -28,7 +28,7 @@ def name_groups(raw: RawMesh, model: Model, resolver: Resolver, offsets: Offsets
 
 
 class _Groups:
-    def __init__(self, raw: RawMesh, model: Model, resolver: Resolver, offsets: Offsets) -> None:
+    def __init__(self, raw: RawMesh, model: Deck, resolver: Resolver, offsets: Offsets) -> None:
         self.raw, self.model, self.resolver, self.offsets = raw, model, resolver, offsets
         self.kinds: dict[str, set[str]] = {}
 

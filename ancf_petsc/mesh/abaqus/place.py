@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ancf_petsc.mesh.abaqus.data import label, rows, table
-from ancf_petsc.mesh.abaqus.deck import Card
-from ancf_petsc.mesh.abaqus.scope import Instance, Scope
+from ancf_petsc.mesh.abaqus.deck import KeywordCard
+from ancf_petsc.mesh.abaqus.scope import Instance, Reader, Scope
 from ancf_petsc.mesh.mesh import Floats
 
-if TYPE_CHECKING:
-    from ancf_petsc.mesh.abaqus.file import Reader
 
-
-def to_rectangular(card: Card, system: str, given: Floats) -> Floats:
+def to_rectangular(card: KeywordCard, system: str, given: Floats) -> Floats:
     """Points (n, 3) of coordinates in SYSTEM=R (x, y, z), C (r, theta, z) or S (r, theta, phi), angles in degrees.
 
     phi is measured from the plane of x and y towards z.
@@ -35,7 +31,7 @@ def to_rectangular(card: Card, system: str, given: Floats) -> Floats:
     return np.stack([radius * np.cos(theta), radius * np.sin(theta), height], axis=1)
 
 
-def system(reader: Reader, card: Card) -> None:
+def system(reader: Reader, card: KeywordCard) -> None:
     """*SYSTEM: origin, a point on the x axis, a point in the x-y plane; without data the global axes again."""
     card.known()
     data = rows(card, 6)
@@ -55,7 +51,7 @@ def system(reader: Reader, card: Card) -> None:
     reader.scope.to_global = _affine(axes, origin)
 
 
-def _axes(card: Card, x: Floats, y: Floats) -> Floats:
+def _axes(card: KeywordCard, x: Floats, y: Floats) -> Floats:
     """Rows are the unit axes with x along the first and y in the plane of both."""
     z = np.cross(x, y)
     if not np.linalg.norm(z) > 1e-12 * np.linalg.norm(x) * np.linalg.norm(y):
@@ -70,7 +66,7 @@ def _affine(axes: Floats, origin: Floats) -> Callable[[Floats], Floats]:
     return lambda points: points @ axes + origin
 
 
-def part(reader: Reader, card: Card) -> None:
+def part(reader: Reader, card: KeywordCard) -> None:
     name = label(card.needed(card.known("NAME", ignored=("INTERNAL",)), "NAME"))
     _outside(reader, card, "a part")
     if name.key in reader.parts:
@@ -78,20 +74,20 @@ def part(reader: Reader, card: Card) -> None:
     reader.parts[name.key] = reader.scope = Scope(name.shown)
 
 
-def end_part(reader: Reader, card: Card) -> None:
+def end_part(reader: Reader, card: KeywordCard) -> None:
     reader.scope = reader.assembly
 
 
-def assembly(reader: Reader, card: Card) -> None:
+def assembly(reader: Reader, card: KeywordCard) -> None:
     _outside(reader, card, "the assembly")
     reader.has_assembly = True
 
 
-def end_assembly(reader: Reader, card: Card) -> None:
+def end_assembly(reader: Reader, card: KeywordCard) -> None:
     reader.scope = reader.assembly
 
 
-def _outside(reader: Reader, card: Card, what: str) -> None:
+def _outside(reader: Reader, card: KeywordCard, what: str) -> None:
     if reader.scope is not reader.assembly:
         raise card.error(
             f"{what} within {reader.scope.name!r}, which is not ended",
@@ -99,7 +95,7 @@ def _outside(reader: Reader, card: Card, what: str) -> None:
         )
 
 
-def instance(reader: Reader, card: Card) -> None:
+def instance(reader: Reader, card: KeywordCard) -> None:
     """*INSTANCE: a part, or a mesh of its own that follows, moved and then turned about the axis from a to b."""
     given = card.known("NAME", "PART", ignored=("DEPENDENT",))
     name = label(card.needed(given, "NAME"))
@@ -120,7 +116,7 @@ def instance(reader: Reader, card: Card) -> None:
     reader.scope, reader.open_instance = own, (name.key, reader.parts[source.key])
 
 
-def end_instance(reader: Reader, card: Card) -> None:
+def end_instance(reader: Reader, card: KeywordCard) -> None:
     """An instance without a mesh of its own has that of its part; sets and surfaces of both are there."""
     if reader.open_instance is None:
         raise card.error("there is no instance to end", cure="mend the deck")
@@ -135,7 +131,7 @@ def end_instance(reader: Reader, card: Card) -> None:
     reader.used_parts.add(label(source.name).key)
 
 
-def motion(card: Card) -> tuple[Floats, Floats]:
+def motion(card: KeywordCard) -> tuple[Floats, Floats]:
     """Rotation (3, 3) and shift (3,) of data lines: a translation, then two points of an axis and an angle in degrees."""
     flat, counts = table(card)
     start = int(counts[0]) if len(counts) else 0

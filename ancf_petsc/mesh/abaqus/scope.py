@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ancf_petsc.mesh.abaqus.data import Label, Line
-from ancf_petsc.mesh.abaqus.deck import Card
+from ancf_petsc.mesh.abaqus.deck import KeywordCard
 from ancf_petsc.mesh.abaqus.types import ElementType
 from ancf_petsc.mesh.mesh import Floats, Integers
 
@@ -35,7 +35,7 @@ class Reference(NamedTuple):
 
     label: Label
     instance: str
-    card: Card
+    card: KeywordCard
     line: Line
     elements: bool = False
 
@@ -65,7 +65,7 @@ class Surface:
     """of_nodes: made of nodes instead of faces."""
 
     shown: str
-    card: Card
+    card: KeywordCard
     of_nodes: bool
     lines: list[SurfaceLine] = field(default_factory=list)
 
@@ -77,7 +77,7 @@ class Elements(NamedTuple):
     type: ElementType
     numbers: Integers
     nodes: Integers
-    card: Card
+    card: KeywordCard
 
 
 class Nodes(NamedTuple):
@@ -85,7 +85,7 @@ class Nodes(NamedTuple):
 
     numbers: Integers
     points: Floats
-    card: Card
+    card: KeywordCard
 
 
 @dataclass
@@ -141,7 +141,7 @@ class Instance(NamedTuple):
 
 
 @dataclass
-class Model:
+class Deck:
     """Everything a deck says about the mesh.
 
     assembly: sets, surfaces and nodes beyond the parts. instances: key -> what the model consists of; a deck without parts
@@ -151,3 +151,21 @@ class Model:
     assembly: Scope
     instances: dict[str, Instance]
     notes: list[str]
+
+
+class Reader:
+    """What the cards so far have said. scope: where nodes, elements and sets are entered.
+
+    open_instance: key of the instance that is being read, and its part. beyond: elements that are no cells, by type.
+    """
+
+    def __init__(self) -> None:
+        self.assembly = self.scope = Scope()
+        self.parts: dict[str, Scope] = {}
+        self.instances: dict[str, Instance] = {}
+        self.open_instance: tuple[str, Scope] | None = None
+        self.has_assembly = False
+        self.used_parts: set[str] = set()
+        self.beyond: dict[str, int] = {}
+        self.refused: dict[str, str] = {}
+        self.skipped: dict[str, str] = {}

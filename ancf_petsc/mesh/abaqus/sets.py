@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ancf_petsc.errors import did_you_mean
 from ancf_petsc.mesh.abaqus.data import Label
-from ancf_petsc.mesh.abaqus.deck import Card
-from ancf_petsc.mesh.abaqus.scope import Instance, Listed, Member, Range, Reference, Scope
+from ancf_petsc.mesh.abaqus.deck import KeywordCard
+from ancf_petsc.mesh.abaqus.scope import Instance, Listed, Member, Range, Reader, Reference, Scope
 from ancf_petsc.mesh.mesh import Integers
-
-if TYPE_CHECKING:
-    from ancf_petsc.mesh.abaqus.file import Reader
 
 Found = dict[str, list[Integers]]
 
@@ -112,7 +108,7 @@ class Resolver:
         return np.unique(np.concatenate([np.empty(0, np.int64), *nodes]))
 
 
-def of_set(reader: Reader, card: Card, what: str, name: Label) -> Integers:
+def of_set(reader: Reader, card: KeywordCard, what: str, name: Label) -> Integers:
     """Ascending numbers of a set of the scope that is being read, as far as the deck has come."""
     known = reader.scope.sets[what].get(name.key)
     if known is None:

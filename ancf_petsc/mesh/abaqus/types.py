@@ -11,7 +11,7 @@ from typing import NamedTuple
 Faces = dict[str, tuple[int, ...]]
 
 
-class Shape(NamedTuple):
+class CellShape(NamedTuple):
     """kind: meshio's name. order: its nodes among those of the file, where that differs."""
 
     kind: str
@@ -19,25 +19,25 @@ class Shape(NamedTuple):
 
 
 SHAPES = {
-    4: Shape("tetra"),
-    10: Shape("tetra10"),
-    8: Shape("hexahedron"),
-    20: Shape("hexahedron20"),
-    6: Shape("wedge"),
-    15: Shape("wedge15"),
-    5: Shape("pyramid"),
-    13: Shape("pyramid13"),
+    4: CellShape("tetra"),
+    10: CellShape("tetra10"),
+    8: CellShape("hexahedron"),
+    20: CellShape("hexahedron20"),
+    6: CellShape("wedge"),
+    15: CellShape("wedge15"),
+    5: CellShape("pyramid"),
+    13: CellShape("pyramid13"),
 }
 """Of solids by the number of their nodes."""
 PLANE_SHAPES = {
-    3: Shape("triangle"),
-    4: Shape("quad"),
-    6: Shape("triangle6"),
-    8: Shape("quad8"),
-    9: Shape("quad9"),
+    3: CellShape("triangle"),
+    4: CellShape("quad"),
+    6: CellShape("triangle6"),
+    8: CellShape("quad8"),
+    9: CellShape("quad9"),
 }
 # Abaqus has the middle of a line second, meshio last.
-LINE_SHAPES = {2: Shape("line"), 3: Shape("line3", (0, 2, 1))}
+LINE_SHAPES = {2: CellShape("line"), 3: CellShape("line3", (0, 2, 1))}
 
 SOLID = "solid"
 PLANE = "plane"
@@ -69,7 +69,7 @@ FACES: dict[str, Faces] = {
 }
 """Corners of the faces by the kind of the corners."""
 
-_PATTERNS: tuple[tuple[str, str, dict[int, Shape]], ...] = (
+_PATTERNS: tuple[tuple[str, str, dict[int, CellShape]], ...] = (
     (r"C3D(4|5|6|8|10|13|15|20)(?!V)[A-Z]*", SOLID, SHAPES),
     (r"CP[ES]G?(3|4|6|8)[A-Z]*", PLANE, PLANE_SHAPES),
     (r"CG?AX(3|4|6|8)[A-Z]*", AXISYMMETRIC, PLANE_SHAPES),
@@ -86,7 +86,7 @@ class ElementType(NamedTuple):
     """family: what the type is for; shape: None for what is no cell, such as a spring."""
 
     family: str
-    shape: Shape | None = None
+    shape: CellShape | None = None
 
 
 def element_type(name: str) -> ElementType | None:

@@ -15,7 +15,7 @@ from ancf_petsc.mesh.mesh import Floats
 from ancf_petsc.mesh.nastran.bulk import Card, integers, numbers
 
 
-class System(NamedTuple):
+class CoordinateSystem(NamedTuple):
     """kind: "R", "C" or "S"; axes: rows are the unit axes in the basic system."""
 
     kind: str
@@ -27,7 +27,7 @@ class System(NamedTuple):
         return rectangular(self.kind, given) @ self.axes + self.origin
 
 
-BASIC = System("R", np.zeros(3), np.eye(3))
+BASIC = CoordinateSystem("R", np.zeros(3), np.eye(3))
 
 
 def rectangular(kind: str, given: Floats) -> Floats:
@@ -56,7 +56,7 @@ class Systems:
                         raise card.error(f"coordinate system {number} is given twice", cure="give it once")
                     self._cards[number] = (card, start)
 
-    def get(self, number: int, asked_by: Card, above: tuple[int, ...] = ()) -> System:
+    def get(self, number: int, asked_by: Card, above: tuple[int, ...] = ()) -> CoordinateSystem:
         """A system by its number. Raises MeshError where it is missing or hangs on itself."""
         if number in self._known:
             return self._known[number]
@@ -75,7 +75,7 @@ class Systems:
             reference = self.get(int(integers([card], 2)[0]), card, above)
             given = np.array([numbers([card], k)[0] for k in range(3, 12)]).reshape(3, 3)
             points = reference.to_basic(given)
-        self._known[number] = System(card.name[5], points[0], _axes(card, points))
+        self._known[number] = CoordinateSystem(card.name[5], points[0], _axes(card, points))
         return self._known[number]
 
 
