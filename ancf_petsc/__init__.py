@@ -8,6 +8,7 @@ print(run.curve["force"])
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 
     from ancf_petsc.input.load import Case
     from ancf_petsc.results.reader import Results
+
+# Where colorama is installed, numba lets it write an escape code to terminals at the end of every process.
+os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
 
 # Names are looked up when they are used: importing the package costs nothing.
 _HOMES = {

@@ -140,12 +140,16 @@ def digest(function: Callable) -> str:
     return sha.hexdigest()[:12]
 
 
-def leaves(function: Callable) -> list[str]:
-    """Names of the functions a nested one is made from in the end: those without a closure."""
-    inner = [item for item in _closure(_plain(function)) if callable(item)]
-    if not inner:
-        return [_plain(function).__name__]
-    return sorted({name for item in inner for name in leaves(item)})
+def ingredients(function: Callable) -> list[str]:
+    """Names of the functions of other packages that a nested one is made from in the end: of a kernel, those of its law."""
+    package = _plain(function).__module__.rpartition(".")[0]
+    found, waiting = set(), [function]
+    while waiting:
+        item = _plain(waiting.pop())
+        waiting += [inner for inner in _closure(item) if callable(inner)]
+        if not _closure(item) and item.__module__.rpartition(".")[0] != package:
+            found.add(item.__name__)
+    return sorted(found)
 
 
 def _named(function: Callable) -> Callable:
@@ -157,7 +161,8 @@ def _named(function: Callable) -> Callable:
     """
     if not _closure(function):
         return function
-    name = f"{function.__name__}[{','.join(leaves(function))}]-{digest(function)}"
+    made_from = ",".join(ingredients(function))
+    name = f"{function.__name__}{made_from and f'[{made_from}]'}-{digest(function)}"
     function.__qualname__ = name
     module = sys.modules[function.__module__]
     if not hasattr(module, name):

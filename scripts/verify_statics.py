@@ -80,7 +80,7 @@ def patch_test(folder: Path) -> Iterator[Row]:
             assembly = held_all_around(code, mesh, folder, law)
             model = assembly.model
             affine = model.reference @ F.T
-            x, free = assembly.reference_vector(), model.motion < 0
+            x, free = assembly.reference_vector(), model.drive < 0
             x.array[:] = np.where(free, affine + 0.01 * model.size * free, affine).ravel()
             newton = Newton(assembly, 1e-13)
             # Newton leaves driven degrees of freedom where they are: at the affine state.

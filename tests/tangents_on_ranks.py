@@ -58,7 +58,7 @@ def compare(data: dict[str, Any], comm: MPI.Comm) -> dict[str, float]:
     """Errors of all that is assembled at one state, and numbers that are the same on any number of ranks."""
     assembly = Assembly(build(case_from_dict(data, Path(".")), comm).model)
     before, x = state(assembly, 1), state(assembly, 2)
-    driven = (assembly.model.motion[: assembly.model.owned] >= 0).ravel()
+    driven = (assembly.model.drive[: assembly.model.owned] >= 0).ravel()
     forces = {"tangent": assembly.internal_force, "mean_tangent": partial(assembly.mean_force, before)}
     add = {"tangent": assembly.add_tangent, "mean_tangent": partial(assembly.add_mean_tangent, before)}
     filled = assembly.create_matrix(symmetric=False)

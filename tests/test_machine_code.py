@@ -26,7 +26,7 @@ from ancf_petsc.material.models import LAWS
 
 PACKAGE = Path(__file__).resolve().parent.parent / "ancf_petsc"
 MANGLED_LOCALS = "_3clocals_3e"  # numba's spelling of <locals> in a symbol
-MANGLED_DIGEST = re.compile(r"_5d_2d[0-9a-f]{12}")  # ]-digest
+MANGLED_DIGEST = re.compile(r"_2d[0-9a-f]{12}")  # -digest
 
 
 def test_laws_elements_and_schemes_in_any_order_have_their_own_code(project, environment, machine_code):
@@ -108,7 +108,7 @@ def test_functions_of_one_factory_differ_in_name_as_in_what_they_are_made_from()
     double, triple, again = scaled(2.0), scaled(3.0), scaled(2.0)
     assert double.__qualname__ != triple.__qualname__
     assert double is again
-    assert summed(double).py_func.__qualname__.startswith("total[times]-")
+    assert summed(double).py_func.__qualname__.startswith("total-")
     assert summed(double)(np.ones(4)) == 8.0
     assert summed(triple)(np.ones(4)) == 12.0
 
