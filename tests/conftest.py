@@ -20,14 +20,14 @@ settings.register_profile("project", deadline=None)
 settings.load_profile("project")
 
 
-MACHINE_CODE = "machine_code"  # in pytest's cache folder
+MACHINE_CODE = ".pytest_cache/machine_code"
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Give the suite a cache for machine code of its own, which two processes fill that know one law each."""
-    if "PYTEST_XDIST_WORKER" in os.environ:  # the main process has set it
+    if "ANCF_CACHE_DIR" in os.environ:  # from whoever runs the suite, or from the main process to its workers
         return
-    folder = Path(config.cache.mkdir(MACHINE_CODE))
+    folder = config.rootpath / MACHINE_CODE
     os.environ["ANCF_CACHE_DIR"] = str(folder)
     if config.args == config.getini("testpaths") and not config.option.collectonly:
         fill(folder)
@@ -52,7 +52,7 @@ def fill(folder: Path) -> None:
 @pytest.fixture(scope="session")
 def machine_code(pytestconfig: pytest.Config) -> Path:
     """A cache for machine code that two processes filled, each of which knew one law."""
-    folder = Path(pytestconfig.cache.mkdir(MACHINE_CODE))
+    folder = pytestconfig.rootpath / MACHINE_CODE
     fill(folder)
     return folder
 
