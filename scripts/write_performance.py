@@ -276,8 +276,9 @@ def alternatives(results: Report) -> list[str]:
     """Parts of this program beside what could stand in their place."""
     rows = [
         (
-            " ".join(parts[:-1]),
-            f"`{parts[-1]}`",
+            parts[0],
+            f"`{'/'.join(parts[1:])}`",
+            result.get("facts", {}).get("dof"),
             result.get("median"),
             result["unit"],
             *effort(result),
@@ -286,7 +287,7 @@ def alternatives(results: Report) -> list[str]:
         for parts, result in sweep(results, "alternatives").items()
     ]
     words = "Parts of this program and what could stand in their place; docs/architecture.md says when."
-    heads = ("part", "by", "measured", "unit", "Newton", "linear", "")
+    heads = ("part", "by", "dof", "measured", "unit", "Newton", "linear", "")
     return ["## Parts and alternatives", "", words, "", *table(heads, rows)] if rows else []
 
 

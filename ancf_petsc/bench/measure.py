@@ -14,6 +14,7 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from mpi4py import MPI
@@ -38,6 +39,7 @@ from ancf_petsc.mesh.read import read_mesh
 from ancf_petsc.parallel.exchange import on_root
 from ancf_petsc.plan.plan import plan_on
 from ancf_petsc.results.reader import open_results
+from ancf_petsc.solve.linear import solver as linear_solver
 
 Result = dict[str, Any]
 WORK = ("read", "setup", "solve", "output")
@@ -82,6 +84,13 @@ def run(
         "error": _error(result, known or {}),
         "facts": {name: value for name, value in result.items() if name != "tip"},
     }
+
+
+def either_solver(comm: MPI.Comm, *, solver: str, **task: Any) -> Result:
+    """`run` with one linear solver whatever the size of the body: "direct" or "iterative"."""
+    limit = 10**9 if solver == "direct" else 0
+    with patch.multiple(linear_solver, DIRECT_LIMIT=limit, CURVED_LIMIT=limit):
+        return run(comm, **task)
 
 
 def explicit(comm: MPI.Comm, *, problem: dict[str, Any], known: dict[str, Any], repetitions: int) -> Result:
@@ -230,6 +239,7 @@ MEASUREMENTS: dict[str, Callable[..., Result]] = {
     "points": points,
     "set_up": set_up,
     "run": run,
+    "either_solver": either_solver,
     "explicit": explicit,
     "stroke": stroke,
     "iterations": iterations,

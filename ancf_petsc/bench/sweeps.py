@@ -229,7 +229,31 @@ def _alternatives() -> list[Row]:
         )
         for name in ("text", "gmsh")
     ]
-    return [*solvers, *masses, *motions, *readers]
+    return [*solvers, *_either_solver(), *masses, *motions, *readers]
+
+
+def _either_solver() -> list[Row]:
+    """Factoring and iterating on both sides of the size from which this program iterates."""
+    meshes = {
+        "3413": [f"cube:{size}" for size in ("0.025", "0.0166", "0.0125", "0.01")],
+        "3-10-1-3": [f"cube:{size}:quadratic" for size in ("0.0166", "0.0125", "0.01", "0.008")],
+    }
+    return [
+        Row(
+            f"alternatives/{solver}/{element}/{mesh}",
+            "solution of a small block, 4 %, 2 steps, one core",
+            "either_solver",
+            {
+                "solver": solver,
+                "problem": {"name": "block", "mesh": mesh, "element": element, "stroke": 0.004, "steps": 2},
+                "parts": SOLUTION,
+            },
+            repetitions=3,
+        )
+        for element, names in meshes.items()
+        for mesh in names
+        for solver in ("direct", "iterative")
+    ]
 
 
 SEARCHES = ("program", "bt", "cp", "l2", "energy")

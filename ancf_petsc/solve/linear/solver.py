@@ -21,11 +21,14 @@ from ancf_petsc.solve.linear.rigid import rigid_motions
 from ancf_petsc.solve.linear.two_level import TwoLevel
 from ancf_petsc.solve.petsc import default_options, is_given
 
-DIRECT_LIMIT, CURVED_LIMIT = 300, 5_000
-TWO_LEVEL_LIMIT, MOST_RANKS = 3_000_000, 64
+DIRECT_LIMIT, CURVED_LIMIT = 300, 5_000  # measured by `ancf bench alternatives/direct alternatives/iterative`
+TWO_LEVEL_LIMIT, MOST_RANKS = (
+    3_000_000,
+    64,
+)  # the coarse matrix is dense and on every rank; the largest body tried has 0.3 million
 SMALL = 3_000
 CHEAP_TO_FACTOR = 30_000
-TIRED = 1.5
+TIRED = 1.5  # times the iterations of a preconditioner just made: it is made anew
 GAMG_THRESHOLD = 0.01  # drops weak couplings from the aggregates: fewer iterations with slopes and mid-nodes
 
 
