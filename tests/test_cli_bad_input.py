@@ -145,7 +145,10 @@ def test_two_ranks_say_it_once_and_do_not_hang(change, ancf, project, tmp_path):
 
 @pytest.mark.parametrize(
     ("options", "words"),
-    [(["-ksp_type", "nonsense"], "nonsense"), (["-no_such_option", "1"], "no solver of this run uses it")],
+    [
+        (["-ksp_type", "nonsense"], "found 'ksp_type = nonsense'"),
+        (["-no_such_option", "1"], "no solver of this run uses it"),
+    ],
 )
 def test_wrong_petsc_options_are_told(options, words, project, tmp_path, capsys):
     code = main(["run", str(project / "cases/pvc_block"), "--out", str(tmp_path / "run"), "--", *options])

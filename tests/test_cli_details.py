@@ -160,3 +160,9 @@ def test_proposed_commands_are_quoted(name, tmp_path, capsys, monkeypatch):
     assert f"did you mean: ancf run {quoted}" in capsys.readouterr().err
     assert main(["new", f"{name} 2"]) == 0
     assert f"ancf run {shlex.quote(f'{name} 2')}" in capsys.readouterr().out
+
+
+def test_loads_are_described_in_words():
+    force = ForceSpec(type="force", group="head", total=(0.0, 0.5, -12.0))
+    gravity = GravitySpec(type="gravity", acceleration=(0.0, 0.0, -9.81))
+    assert [force.describe(), gravity.describe()] == ["on head: (0, 0.5, -12)", "(0, 0, -9.81)"]

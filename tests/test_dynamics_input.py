@@ -79,17 +79,21 @@ def test_a_step_is_shortened_to_fill_the_intervals_of_outputs(tmp_path, caplog):
     assert curve["steps"].tolist() == [0, 5, 5, 5]
 
 
-def test_a_signal_stops_after_the_step_with_everything_written(tmp_path):
-    """The state it stopped at is the last row."""
+@pytest.mark.parametrize("integrator", ["energy_momentum", "theta"])
+def test_a_signal_stops_after_the_step_with_everything_written(integrator, tmp_path):
+    """The state it stopped at is the last row, with the work of gravity up to there."""
 
     def watch(done: float) -> None:
         if done > 0.5:
             os.kill(os.getpid(), signal.SIGTERM)
 
-    dynamics = {"duration": 0.1, "outputs": 2, "step": 0.01, "integrator": "energy_momentum"}
+    dynamics = {"duration": 0.1, "outputs": 2, "step": 0.01, "integrator": integrator}
     with pytest.raises(Interrupted, match="stopped at time 0.06; everything up to here is saved"):
         run_case(case(dynamics), tmp_path / "run", watch=watch)
-    assert read_table(tmp_path / "run" / "curve.csv")["time"].tolist() == pytest.approx([0.0, 0.05, 0.06])
+    curve = read_table(tmp_path / "run" / "curve.csv")
+    assert curve["time"].tolist() == pytest.approx([0.0, 0.05, 0.06])
+    assert curve["external_work"][2] > 1.1 * curve["external_work"][1] > 0.0
+    assert np.abs(curve["energy_drift"]).max() < 1e-3 * curve["external_work"][2]
 
 
 def test_options_of_petsc_have_the_last_word(tmp_path):

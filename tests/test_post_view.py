@@ -18,7 +18,7 @@ from ancf_petsc.cli import main
 from ancf_petsc.errors import CaseError, EnvironmentProblem
 from ancf_petsc.mesh.mesh import Group
 from ancf_petsc.post import view
-from ancf_petsc.post.case_view import Marked, _shown
+from ancf_petsc.post.case_view import Marked, _shown, _spread
 from ancf_petsc.post.scene import one_line
 from ancf_petsc.post.view import Look, describe, label, scalars
 from ancf_petsc.results.reader import Results, open_results
@@ -256,3 +256,11 @@ def test_view_of_a_case_before_it_is_solved(project, tmp_path):
 def test_wrong_words_are_told(results, capsys, arguments, code, message):
     assert main(["view", str(results.folder), *arguments]) == code
     assert message in capsys.readouterr().err
+
+
+def test_small_groups_of_slender_bodies_have_a_mark_at_each_corner():
+    """A single arrow at a corner of a column's head would look like an eccentric force."""
+    points = np.array([[0, 0, 2], [0.1, 0, 2], [0.1, 0.1, 2], [0, 0.1, 2], [0, 0, 0], [0.1, 0, 0]], float)
+    mesh = SimpleNamespace(points=points, size=2.005)
+    assert sorted(_spread(mesh, np.arange(4))) == [0, 1, 2, 3]
+    assert len(_spread(mesh, np.arange(1))) == 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import meshio
 import numpy as np
 import pytest
@@ -118,6 +120,11 @@ def test_a_leaning_column_is_followed_far_beyond_euler_s_load(tmp_path):
     assert summary["iterations"]["newton"] < 150
     # The elastica under twice Euler's load: K. Mattiasson's elliptic integrals for P L^2 / (E I) = pi^2 / 2, a slender column.
     assert results.probes["head.uy"][-1] == pytest.approx(0.79, abs=0.03)
+    shown = re.findall(r"min det F (\S+)", (tmp_path / "run" / "log.txt").read_text())
+    assert len(shown) > len(
+        results.curve["min_det_F"]
+    )  # steps between outputs too: means of elements, bent without swelling
+    assert min(map(float, shown)) == pytest.approx(results.curve["min_det_F"].min(), abs=2e-3)
 
 
 def test_an_option_keeps_its_line_search(tmp_path):

@@ -20,6 +20,9 @@ from typing import Any, NoReturn
 
 from ancf_petsc.errors import AncfError, CaseError, EnvironmentProblem, Interrupted, did_you_mean
 
+PLAIN_MESSAGES = ("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
+"""Else numba has a code for terminals written at the end of every process that mpiexec started, also into files."""
+
 VERBS = {
     "run": ("ancf_petsc.cli.run", "solve a case"),
     "check": ("ancf_petsc.cli.check", "check a case and its mesh, solve nothing"),
@@ -46,6 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
     _keep_petsc_from_signals()
+    os.environ.setdefault(*PLAIN_MESSAGES)
     try:
         with _without_warnings_of_arithmetic():
             code = _command(words)

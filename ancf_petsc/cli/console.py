@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING
+
+from ancf_petsc.log import on_terminal
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,8 +19,9 @@ def console() -> Console:
     """The console of standard output; into a pipe or file lines are not cut at 80 columns."""
     from rich.console import Console
 
-    width = None if sys.stdout.isatty() else PIPE_WIDTH
-    return Console(width=width, highlight=False, emoji=False, soft_wrap=width is not None)
+    seen = on_terminal()
+    width = None if seen else PIPE_WIDTH
+    return Console(width=width, highlight=False, emoji=False, soft_wrap=not seen, force_terminal=seen)
 
 
 def show_table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, title: str = "") -> None:

@@ -13,9 +13,11 @@ HELP = "solve a case; under mpiexec -n N on N ranks"
 PETSC_OPTIONS = True
 
 
-def add_case_arguments(parser: argparse.ArgumentParser) -> None:
-    """The case and its changes, as several verbs take them."""
-    parser.add_argument("case", metavar="CASE", type=Path, help="a case file, or a folder with case.toml")
+def add_case_arguments(
+    parser: argparse.ArgumentParser, what: str = "a case file, or a folder with case.toml"
+) -> None:
+    """The case and its changes, as several verbs take them. what: can be given as the case."""
+    parser.add_argument("case", metavar="CASE", type=Path, help=what)
     parser.add_argument(
         "--set",
         dest="changes",

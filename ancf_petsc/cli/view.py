@@ -19,7 +19,7 @@ PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_case_arguments(parser)
+    add_case_arguments(parser, "the folder of a run; or a case file, or a folder with case.toml")
     parser.add_argument(
         "--screenshot", type=Path, metavar="FILE", help="write a picture instead, no display needed"
     )

@@ -37,7 +37,7 @@ class GravitySpec(LoadTable):
         return self.acceleration
 
     def describe(self) -> str:
-        return f"{self.acceleration}"
+        return f"({', '.join(f'{c:g}' for c in self.acceleration)})"
 
 
 class ForceSpec(LoadTable):
@@ -53,7 +53,7 @@ class ForceSpec(LoadTable):
         return self.total
 
     def describe(self) -> str:
-        return f"{(self.group, self.total)}"
+        return f"on {self.group}: ({', '.join(f'{c:g}' for c in self.total)})"
 
 
 Types = GravitySpec | ForceSpec

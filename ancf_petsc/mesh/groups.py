@@ -230,7 +230,7 @@ def describe_set(mesh: Mesh, group: Group) -> str | None:
     corners = _belongs(mesh, mesh.cells[:, : KINDS[KINDS[mesh.kind].linear or mesh.kind].nodes].ravel())
     loose = np.count_nonzero(corners[group.nodes] & ~covered[group.nodes])
     what = {0: "point", 1: "edge", 2: "face"}
-    found = [f"{len(rows)} {what[dimension]}s" for dimension, rows in parts.items()]
+    found = [f"{len(rows)} {what[dimension]}{'s' * (len(rows) > 1)}" for dimension, rows in parts.items()]
     said = f"{group.name}: a set of nodes, taken as the {' and '.join(found)} it covers" if found else ""
     if loose:
         count = (

@@ -163,8 +163,10 @@ def _add_marks(plotter: pyvista.Plotter, mesh: Mesh, support: Marked) -> Points:
 
 
 def _spread(mesh: Mesh, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """A few of many nodes, one a box of a grid: marks stay apart on fine meshes."""
-    boxes = np.floor(mesh.points[nodes] / (mesh.size / 14)).astype(int)
+    """A few of many nodes, one a box of a grid: marks stay apart on fine meshes, and small groups show several."""
+    points = mesh.points[nodes]
+    spacing = np.clip(np.linalg.norm(np.ptp(points, axis=0)) / 4, mesh.size / 50, mesh.size / 14)
+    boxes = np.floor(points / spacing).astype(int)
     _, first = np.unique(boxes, axis=0, return_index=True)
     return nodes[first]
 

@@ -120,9 +120,9 @@ def refuse_wrong_values(given: Mapping[str, object]) -> Iterator[None]:
         if not given:
             raise
         said = str(error).splitlines()[-1].split("] ", 1)[-1]
-        names = ", ".join(given)
+        values = ", ".join(f"{name} = {value}" for name, value in given.items())
         raise CaseError(
-            f"PETSc refuses an option: {said}", key="petsc", got=names, cure="correct or drop it"
+            f"PETSc refuses an option: {said}", key="petsc", got=values, cure="correct or drop it"
         ) from error
 
 
