@@ -240,8 +240,7 @@ def test_thickness_and_plane_stress():
     square = np.array(ELEMENTS["2412"].cell.corners, dtype=float)
     points = np.column_stack([square, np.zeros(4)])
     tables = make_tables(ELEMENTS["2412"], np.arange(4)[None], points[None], thickness=0.1)
-    lame, mu = LAWS["svk"].parameters(1.0, 0.3)
-    parameters = np.array([2 * lame * mu / (lame + 2 * mu), mu])
+    parameters = plane_stress(LAWS["svk"].parameters(1.0, 0.3))
     strain, force = 1e-6, np.zeros((4, 3))
     point_solid.make_kernels(LAWS["svk"]).internal_force(
         (points * [1 + strain, 1 - 0.3 * strain, 1],), tables, parameters, ONE, force
