@@ -15,6 +15,7 @@ from ancf_petsc import load_case, log
 from ancf_petsc.analysis.run import run_case
 from ancf_petsc.cli import console, main
 from ancf_petsc.errors import CaseError
+from ancf_petsc.input.loads import ForceSpec, GravitySpec
 from ancf_petsc.results.folder import check_folder
 from ancf_petsc.results.reader import open_results
 

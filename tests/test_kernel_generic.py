@@ -10,6 +10,7 @@ from ancf_petsc.kernel import point_solid, tet3413
 from ancf_petsc.kernel.interface import Means, Span, Target
 from ancf_petsc.kernel.tables import make_tables
 from ancf_petsc.material import LAWS
+from ancf_petsc.material.models import plane_stress
 
 KERNEL_CODES = tuple(code for code in CODES if ELEMENTS[code].components == ELEMENTS[code].cell.dimension)
 SOLIDS = tuple(code for code in KERNEL_CODES if ELEMENTS[code].components == 3)
