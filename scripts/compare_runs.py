@@ -56,7 +56,7 @@ def print_table(runs: list[ancf.Results]) -> None:
             initial_stiffness(stroke, force),
             secant_stiffness(stroke, force),
         )
-        print(f"{run.title[:31]:<32}" + "".join(f"{number:>18.6g}" for number in numbers))
+        print(f"{run.folder.resolve().name[:31]:<32}" + "".join(f"{number:>18.6g}" for number in numbers))
 
 
 def draw(runs: list[ancf.Results], file: Path) -> None:
@@ -66,7 +66,7 @@ def draw(runs: list[ancf.Results], file: Path) -> None:
 
     figure, axes = plt.subplots(figsize=(7.5, 4.5), layout="constrained")
     for run in runs:
-        axes.plot(run.curve["stroke"], run.curve["force"], marker=".", label=run.title)
+        axes.plot(run.curve["stroke"], run.curve["force"], marker=".", label=run.folder.resolve().name)
     units = read_units(runs[0].units)
     axes.set_xlabel(with_unit("stroke", units.length))
     axes.set_ylabel(with_unit("force", units.force))

@@ -134,7 +134,7 @@ def test_nodes_that_cover_nothing_are_counted(tmp_path):
         in notes
     )
     assert (
-        "edge: a set of nodes, taken as the 1 edges it covers; "
+        "edge: a set of nodes, taken as the 1 edge it covers; "
         "1 of its 3 nodes belong to no whole face or edge in it: held as points" in notes
     )
 

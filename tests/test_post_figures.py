@@ -195,6 +195,7 @@ def test_the_script_compares_runs(block, mpirun, project, tmp_path):
     said = mpirun(1, [script, block.folder, block.folder, "--out", tmp_path / "both.png"]).stdout
     # force 200 times the stroke of 0.1: 20 at most, half of 20 times 0.1 put in and kept
     assert said.count("-20                 1                 1               200               200") == 2
+    assert said.count(f"\n{block.folder.name} ") == 2  # by folder: changed runs of a case share its title
     assert (tmp_path / "both.png").read_bytes().startswith(b"\x89PNG")
 
 
