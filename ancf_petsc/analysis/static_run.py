@@ -28,6 +28,8 @@ from ancf_petsc.solve.stability import beyond_the_law
 log = logging.getLogger(STEPS)
 RISE = tuple(k / 10 for k in range(1, 11))
 """States at which the work is summed up while loads that do not begin at 0 come up."""
+IMBALANCE = 0.02
+"""Of work and energy: the shipped cases in one step each have less than 0.001."""
 
 
 class StaticRun:
@@ -84,6 +86,7 @@ class StaticRun:
             self._save_last_state(path)
             raise
         self._note_doubts(path.s, path.x)
+        self._note_imbalance()
 
     def _rise(self) -> PETSc.Vec:
         """The state at s = 0 where ramps do not begin at 0: loads and moves come up to it in proportion."""
@@ -144,6 +147,18 @@ class StaticRun:
         """Warn once where the law is beyond its limit, at the end of the path and where loads turn; the summary has it."""
         if self.doubts is None and (found := beyond_the_law(self.assembly, x)) is not None:
             self.doubts = f"at pseudo-time {s:.6g}: {found}"
+            log.warning("%s", self.doubts)
+
+    def _note_imbalance(self) -> None:
+        """Warn where the work does not balance the energy: along a smooth path it does to far less than IMBALANCE."""
+        work, energy = self.record.row["external_work"], self.record.row["strain_energy"]
+        off = abs(work - energy) / max(abs(work), abs(energy), np.finfo(float).tiny)
+        if self.doubts is None and off > IMBALANCE:
+            self.doubts = (
+                f"external work {work:.6g} and strain energy {energy:.6g} differ by {100 * off:.1f} %: the path has jumped to "
+                "another branch, or its steps are too long; see with more statics.steps, or, for loads, "
+                'statics.control = "arc_length"'
+            )
             log.warning("%s", self.doubts)
 
     def _load_at(self, s: float) -> list[float]:
