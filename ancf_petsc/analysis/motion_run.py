@@ -50,6 +50,7 @@ class MotionRun:
         self._ramped = any(load.ramp.kind != "constant" for load in model.loads)
         self._kinetic = 0.0
         self._start_energy = 0.0
+        self._work_lags = False
         self._begun = time.perf_counter()
         self.path = TimeIntegration(integrator, times, self._on_step, self._on_corner, stop)
 
@@ -62,6 +63,8 @@ class MotionRun:
             self.path.run()
         except (MotionStopped, Interrupted):
             if self.integrator.time != self._written:
+                if self._work_lags:
+                    self.work.add(self.integrator.time, self._powers())
                 self._write()
             raise
         finally:
@@ -92,7 +95,8 @@ class MotionRun:
             self.work.add_known(*step.known)
             return
         often = self.equations.damping or self.equations.is_driven or self._ramped
-        if often or step.time in self.times or step.time in self.path.corners:
+        self._work_lags = not (often or step.time in self.times or step.time in self.path.corners)
+        if not self._work_lags:
             self.work.add(step.time, self._powers())
 
     def _on_corner(self, now: float) -> None:
