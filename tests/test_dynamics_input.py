@@ -96,6 +96,24 @@ def test_a_signal_stops_after_the_step_with_everything_written(integrator, tmp_p
     assert np.abs(curve["energy_drift"]).max() < 1e-3 * curve["external_work"][2]
 
 
+def test_the_row_a_signal_stops_at_has_the_work_up_to_there(tmp_path):
+    """Of constant loads too, whose work is otherwise taken at outputs alone."""
+    dynamics = {"duration": 0.1, "outputs": 2, "step": 0.01, "integrator": "theta"}
+    data = case(dynamics)
+
+    def watch(done: float) -> None:
+        if done > 0.5:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    with pytest.raises(Interrupted):
+        run_case(data, tmp_path / "stopped", watch=watch)
+    run_case(data.with_changes({"dynamics.outputs": 10}), tmp_path / "whole")
+    stopped, whole = (read_table(tmp_path / name / "curve.csv") for name in ("stopped", "whole"))
+    row = np.argmin(np.abs(whole["time"] - stopped["time"][-1]))
+    assert stopped["external_work"][-1] == pytest.approx(whole["external_work"][row], rel=1e-9)
+    assert stopped["external_work"][-1] != pytest.approx(stopped["external_work"][-2], rel=1e-3)
+
+
 def test_options_of_petsc_have_the_last_word(tmp_path):
     """Another solver gives the same motion; an option nobody reads is refused."""
     ends = []

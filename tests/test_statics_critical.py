@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import meshio
 import numpy as np
 import pytest
 from bodies import assembly_of
@@ -90,6 +91,29 @@ def test_a_path_may_take_the_stable_branch(tmp_path):
     assert (np.diff(force) > 0).all()
     assert (np.abs(results.probes["head.uy"][1:]) > 0.1).all()
     np.testing.assert_allclose(results.curve["pseudo_time"], np.linspace(0, 1, 6), rtol=1e-12)
+
+
+def test_a_beam_a_hundred_times_as_long_as_thick_takes_the_stable_branch(tmp_path):
+    """Along a narrow valley of the energy: stretching is 1e4 times as stiff as bending. Tip of the elastica at 1.884 times
+    Euler's load: 0.803 aside, 0.123 high (Timoshenko and Gere, Theory of elastic stability, table 2-4).
+    """
+    height = np.linspace(0.0, 1.0, 41)
+    lines = np.stack((np.arange(40), np.arange(1, 41)), axis=1)
+    meshio.Mesh(np.outer(height, [0.0, 0.0, 1.0]), [("line", lines)]).write(tmp_path / "beam.vtu")
+    data = {
+        "title": "Beam",
+        "mesh": {"file": str(tmp_path / "beam.vtu"), "element": "1222"},
+        "section": {"area": 1e-4, "inertia": 1e-8 / 12},
+        "groups": {"root": {"plane": "z", "at": "min"}, "tip": {"plane": "z", "at": "max"}},
+        "material": {"law": "svk", "young": 1e9, "poisson": 0.0},
+        "constraint": [{"group": "root", "fix": ["x", "z"], "slopes": ["x"]}],
+        "load": [{"type": "force", "group": "tip", "total": [0.0, 0.0, -3.8754664482590027]}],
+        "statics": {"times": [0.538728988432, 1.0], "on_bifurcation": "follow"},
+        "probe": [{"name": "tip", "group": "tip"}],
+    }
+    results, _, _ = solved(data, tmp_path)
+    assert abs(results.probes["tip.x"][-1]) == pytest.approx(0.803, abs=1e-3)
+    assert results.probes["tip.z"][-1] == pytest.approx(0.123, abs=1e-3)
 
 
 def test_an_ordinary_path_has_no_critical_point_and_pays_little_for_it(tmp_path, monkeypatch):

@@ -16,7 +16,7 @@ from ancf_petsc.solve.newton import Newton
 
 FIRST_PUSH = 1e-3
 """Of the body's size: how far the mode is followed at first."""
-MOST_ITERATIONS, LONGEST = 100, 0.05
+MOST_ITERATIONS, LONGEST = 400, 0.05
 FLAT = 1e-7
 """Out-of-balance force over the force scale: a saddle is reached, and left along its mode."""
 
