@@ -152,7 +152,7 @@ class StaticRun:
     def _note_imbalance(self) -> None:
         """Warn where the work does not balance the energy: along a smooth path it does to far less than IMBALANCE."""
         work, energy = self.record.row["external_work"], self.record.row["strain_energy"]
-        off = abs(work - energy) / max(abs(work), abs(energy), np.finfo(float).tiny)
+        off = abs(work - energy) / max(abs(work), abs(energy), 1e-300)
         if self.doubts is None and off > IMBALANCE:
             self.doubts = (
                 f"external work {work:.6g} and strain energy {energy:.6g} differ by {100 * off:.1f} %: the path has jumped to "
