@@ -79,6 +79,16 @@ def test_a_step_is_shortened_to_fill_the_intervals_of_outputs(tmp_path, caplog):
     assert curve["steps"].tolist() == [0, 5, 5, 5]
 
 
+def test_outputs_are_hit_where_the_sum_of_their_steps_is_rounded(tmp_path):
+    """Three thirds of a seventh of 0.1 are not that seventh: it would have no row. A method without compiled loops, which leap."""
+    end = 0.1 / 7
+    assert end * 3 / 3 != end
+    run_case(case({"duration": 0.1, "outputs": 7, "step": 0.005, "integrator": "theta"}), tmp_path / "run")
+    curve = read_table(tmp_path / "run" / "curve.csv")
+    assert curve["time"].tolist() == [0.1 * k / 7 for k in range(8)]
+    assert curve["steps"].tolist() == [0, *[3] * 7]
+
+
 @pytest.mark.parametrize("integrator", ["energy_momentum", "theta"])
 def test_a_signal_stops_after_the_step_with_everything_written(integrator, tmp_path):
     """The state it stopped at is the last row, with the work of gravity up to there."""

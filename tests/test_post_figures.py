@@ -159,6 +159,13 @@ def test_the_drift_is_what_the_balance_gains(motion):
     np.testing.assert_allclose(drift, 1e-3 * motion.curve["time"] / largest, atol=1e-15)
 
 
+def test_work_that_is_stored_or_lost_is_no_drift():
+    """Work of 8 becomes 1 of motion, 4 of strain and 2.6 of loss: the balance falls by 0.4, a twentieth of the largest part."""
+    curve = {"kinetic_energy": 1.0, "strain_energy": 4.0, "dissipated_energy": 2.6, "external_work": 8.0}
+    drift = figures.energy_drift({name: value * np.array([0.0, 0.5, 1.0]) for name, value in curve.items()})
+    np.testing.assert_allclose(drift, [0.0, -0.025, -0.05], atol=1e-15)
+
+
 def test_probes_are_drawn_where_they_move(motion, block):
     (axes,) = figures.probes([motion]).axes
     assert axes.get_ylabel() == "x position [mm]"

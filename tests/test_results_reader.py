@@ -53,6 +53,14 @@ def test_fields_are_found_by_step_from_both_ends_and_by_time(folder):
     assert results.step_at(0.3) == 2
 
 
+@pytest.mark.parametrize(
+    ("time", "step"), [(-1.0, 0), (0.04, 0), (0.06, 1), (0.15, 1), (0.6, 2), (0.7, 3), (9.0, 3)]
+)
+def test_a_time_between_outputs_is_that_of_the_nearest(folder, time, step):
+    """Earlier or later than asked; outputs at 0, 0.1, 1/3 and 1."""
+    assert open_results(folder).step_at(time) == step
+
+
 def test_the_mesh_is_the_deformed_body_with_its_fields(folder):
     results = open_results(folder)
     grid = results.mesh(scale=2.0)

@@ -11,9 +11,12 @@ from petsc4py import PETSc
 
 from ancf_petsc.algebra.blocks import factorise, solve_factors, upper_pattern
 from ancf_petsc.algebra.coarse import add_motion, restrict
+from ancf_petsc.mesh.generate import make_mesh
 from ancf_petsc.solve.linear.half import HalfMatrix
 from ancf_petsc.solve.linear.rigid_parts import RigidParts, bisected, inverse
 from ancf_petsc.solve.linear.two_level import TwoLevel
+from ancf_petsc.solve.newton import Newton
+from ancf_petsc.solve.petsc import petsc_options
 
 SINGLE = 1e-5  # what single precision leaves of a preconditioner, some rounding added up
 
@@ -169,6 +172,37 @@ def test_a_matrix_that_is_not_definite_still_makes_a_definite_preconditioner(bod
     assert not inverse(np.array([[1.0, 2.0], [2.0, 1.0]])).any()
 
 
+@pytest.fixture
+def iterating(tmp_path):
+    """Newton's method for a cube just large enough for conjugate gradients; PETSc's objects are freed if the test fails too."""
+    make_mesh("cube", tmp_path / "cube.msh", divisions=(4, 4, 4))
+    newton = Newton(assembly_of(block(tmp_path / "cube.msh"), tmp_path), 1e-8)
+    yield newton
+    newton.destroy()
+
+
+def test_conjugate_gradients_give_up_where_a_factorisation_goes_on(iterating):
+    """They solve with the tangent at rest, not with that of the cube pressed flat, which has negative eigenvalues."""
+    assembly, linear = iterating.assembly, iterating.linear
+    x, rhs, found, balance = (assembly.reference_vector() for _ in range(4))
+    rhs.array[:] = np.cos(3 * np.arange(len(rhs.array_r)))
+    rhs.array[assembly.driven] = 0.0
+    gave_up = []
+    for height in (1.0, 0.3):
+        x.array[2::3] = height * assembly.reference_vector().array_r[2::3]
+        iterating.tangent_at(x)
+        linear.ksp.solve(rhs, found)
+        gave_up.append(linear.gave_up())
+    assert gave_up == [False, True]
+    linear.fall_back_to_direct()
+    iterating.tangent_at(x)
+    linear.ksp.solve(rhs, found)
+    assert not linear.gave_up()
+    assert linear.negative_pivots() > 0
+    iterating.matrix.mat.mult(found, balance)
+    np.testing.assert_allclose(balance.array_r, rhs.array_r, atol=1e-9)
+
+
 def test_parts_are_equal_and_compact():
     points = np.random.default_rng(5).uniform(size=(1000, 3)) * [4, 1, 1]
     labels = bisected(points, 7)
@@ -185,8 +219,6 @@ def test_same_solution_on_every_number_of_ranks_in_few_iterations(mpirun, tmp_pa
 
     With the parts 28, 42 and 40 were counted; how PT-Scotch divides the body differs from run to run.
     """
-    from ancf_petsc.mesh.generate import make_mesh
-
     make_mesh("cube", tmp_path / "cube.msh", divisions=(14, 14, 14))
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
@@ -204,10 +236,6 @@ def test_same_solution_on_every_number_of_ranks_in_few_iterations(mpirun, tmp_pa
 
 
 def test_options_choose_another_solver(tmp_path):
-    from ancf_petsc.mesh.generate import make_mesh
-    from ancf_petsc.solve.newton import Newton
-    from ancf_petsc.solve.petsc import petsc_options
-
     make_mesh("cube", tmp_path / "cube.msh", divisions=(10, 10, 10))
     assembly = assembly_of(block(tmp_path / "cube.msh"), tmp_path)
     with petsc_options({"ksp_type": "cg", "pc_type": "icc"}):

@@ -17,7 +17,7 @@ from ancf_petsc import open_results
 from ancf_petsc.cli import main
 from ancf_petsc.errors import NoEquilibrium
 from ancf_petsc.mesh.generate import make_mesh
-from ancf_petsc.solve.load_path import LoadPath, Marks
+from ancf_petsc.solve.load_path import QUICK, LoadPath, Marks
 from ancf_petsc.solve.newton import Newton, Outcome
 
 SIDE, WIDTH = 0.1, 0.05  # of the shipped cube, a quarter of which is meshed
@@ -91,6 +91,13 @@ def test_steps_that_fail_are_halved_until_they_converge(cube, tmp_path):
     assert list(dict.fromkeys(refused))[:2] == [0.1, 0.05]
     assert refused.min() > 0.04
     np.testing.assert_allclose(np.diff([0.0] + [step.s for step in steps]), sizes, rtol=1e-12)
+
+
+def test_quick_steps_are_followed_by_longer_ones(cube, tmp_path):
+    """Twice as long as wished for before, in equal parts of the way to the end: 0.2 of 0.9 makes five, 0.4 of 0.72 two."""
+    steps, _, _ = follow(cube, tmp_path, [1.0])
+    assert max(step.newton for step in steps) <= QUICK
+    assert [step.size for step in steps] == pytest.approx([0.1, 0.18, 0.36, 0.36], rel=1e-12)
 
 
 def test_a_path_ends_at_the_last_state_that_converged(cube, tmp_path):

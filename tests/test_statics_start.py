@@ -13,6 +13,7 @@ from slender_bodies import column, euler, solved
 
 from ancf_petsc import case_from_dict
 from ancf_petsc.analysis.modes import find_modes
+from ancf_petsc.model.drive import Drive
 from ancf_petsc.model.ramp import Ramp
 from ancf_petsc.model.work import PathWork
 from ancf_petsc.plan.outputs import output_times
@@ -90,6 +91,32 @@ def test_work_along_the_length_of_a_path_that_turns_back():
     for length in lengths[1:]:
         work.add(np.sin(2 * length), np.zeros(0), np.array([length]), length)
     assert work.total == pytest.approx((1 - np.cos(2.4)) / 2, rel=1e-4)
+
+
+def test_work_is_exact_from_the_first_step_on_where_reactions_are_cubic():
+    """R = 2 q + q^3 over q = 0.5 f, W = q^2 + q^4 / 4: once four states are known, for what came before them too."""
+    drive = Drive(0.5, Ramp("cosine"))
+    work = PathWork([drive], [])
+    work.start(0.0, np.zeros(1), np.zeros(0))
+    for count, s in enumerate((0.3, 0.4, 0.6, 0.65, 1.0), 2):
+        q = drive.value(s)
+        work.add(s, np.array([2 * q + q**3]), np.zeros(0))
+        if count >= 4:
+            assert work.total == pytest.approx(q**2 + q**4 / 4, rel=1e-13)
+
+
+def test_work_of_a_load_is_that_of_its_force_along_the_displacement():
+    """D = 4 p^3 - p^2, where the change of p D is not twice the integral of D: W = 3 p^4 - 2 p^3 / 3."""
+
+    class Load:
+        ramp = Ramp("cosine")
+
+    work = PathWork([], [Load()])
+    work.start(0.0, np.zeros(0), np.zeros(1))
+    for s in (0.3, 0.6, 1.0):
+        p = Load.ramp.value(s)
+        work.add(s, np.zeros(0), np.array([4 * p**3 - p**2]))
+    assert work.total == pytest.approx(3 - 2 / 3, rel=1e-13)
 
 
 # --- doubtful ends
