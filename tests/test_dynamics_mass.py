@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from family import mesh_of, motion
 from motion_cases import GRAVITY, PROJECT, Followed, body, pendulum
+from mpi4py import MPI
 
 from ancf_petsc import case_from_dict, run
+from ancf_petsc.analysis.build import build
 from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.motion.mass_solver import MassSolver
 
@@ -17,6 +19,27 @@ VOLUME, DENSITY = 0.5 * 0.1 * 0.1, 7800.0
 
 def looked_at(look, **dynamics):
     return Followed(pendulum({**STILL, **dynamics}), look).rows[0]
+
+
+def test_gravity_pulls_at_each_material_by_its_own_density(tmp_path):
+    """Half of the length twice as dense: the weight is one and a half times that of one material."""
+    data = pendulum(STILL, groups={"half": {"box": [[-1, -1, -1], [0.25, 1, 1]]}})
+    data["material"] = [data["material"] | {"group": "half", "density": 2 * DENSITY}, data["material"]]
+    model = build(case_from_dict(data, PROJECT), MPI.COMM_SELF).model
+    weight = model.loads[0].pattern.sum(axis=0)
+    np.testing.assert_allclose(weight, [0.0, 0.0, -9.81 * 1.5 * VOLUME * DENSITY], rtol=1e-12)
+
+
+def test_a_plate_in_plane_stress_has_condensed_parameters():
+    section = {"thickness": 0.1, "plane": "stress"}
+    data = body("pendulum_2432_8.msh", STILL, section=section, constraint=[])
+    data["mesh"]["element"] = "2432"
+    model = build(case_from_dict(data, PROJECT), MPI.COMM_SELF).model
+    young, poisson = data["material"]["young"], data["material"]["poisson"]
+    condensed = young * poisson / (1 - poisson**2)
+    np.testing.assert_allclose(
+        model.regions[0].parameters, [condensed, young / (2 * (1 + poisson))], rtol=1e-14
+    )
 
 
 @pytest.mark.parametrize("kind", ["consistent", "lumped"])
