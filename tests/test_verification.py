@@ -62,5 +62,6 @@ def test_nine_of_ten_wrong_changes_are_caught_and_survivors_have_a_reason(projec
     rows = json.loads((project / "docs" / "verification" / "mutations.json").read_text())
     survivors = [row for row in rows if not row["caught_by"]]
     assert rows
+    assert len(rows) >= 60
     assert len(survivors) <= 0.1 * len(rows)
     assert all(row["why"] for row in survivors)

@@ -18,7 +18,7 @@ from ancf_petsc.solve.newton import Newton
 FIRST, PASSING, CLOSE = 8, 2, 12
 """Iterations for the lowest mode: of the first state, of states along the path, where the value itself counts."""
 LARGEST_TO_COUNT = 300_000
-WORTH, PATIENCE = 100, 4
+WORTH, PATIENCE = 300, 10
 NEAR = 0.5
 """Of the largest lowest eigenvalue: below it every state is looked at."""
 NEUTRAL = 1e-5
