@@ -2,7 +2,8 @@
 """Writes docs/performance.md and its charts from docs/benchmarks/*.json. All numbers in it come from there.
 
 ancf bench --json docs/benchmarks/bench.json                            # 5 minutes on two quiet cores
-ancf bench accuracy stroke iterations scaling alternatives --json docs/benchmarks/sweeps.json    # 20 minutes
+ancf bench accuracy stroke iterations scaling --json docs/benchmarks/sweeps.json    # 20 minutes
+ancf bench alternatives --json docs/benchmarks/alternatives.json        # 3 minutes
 scripts/bench_peers.py --json docs/benchmarks/peers.json
 scripts/write_performance.py
 """
@@ -30,14 +31,14 @@ Report = dict[str, Any]
 
 
 def main() -> int:
-    bench, sweeps, peers = (load(name) for name in ("bench", "sweeps", "peers"))
+    bench, sweeps, parts, peers = (load(name) for name in ("bench", "sweeps", "alternatives", "peers"))
     if not bench:
         print(
             "error: docs/benchmarks/bench.json is missing: ancf bench --json docs/benchmarks/bench.json",
             file=sys.stderr,
         )
         return 2
-    results = {**bench["results"], **sweeps.get("results", {})}
+    results = {**bench["results"], **sweeps.get("results", {}), **parts.get("results", {})}
     pieces = [*head(bench), *targets(bench["results"]), *misses(bench["results"])]
     pieces += [
         *side_by_side(peers),

@@ -96,7 +96,11 @@ class MaterialSpec(Table):
 
     group: Name | None = key("a group's name in quotes; of the mesh file or of [groups]", None)
     law: Annotated[str, one_of(laws, "a law")] = key('a law; such as law = "svk"')
-    young: float = key("a number > 0; Young's modulus in the unit of stress, such as young = 6.8e6", gt=0)
+    young: float = key(
+        "a number > 0 (1e-50 to 1e50); Young's modulus in the unit of stress, such as young = 6.8e6",
+        ge=1e-100,
+        le=1e100,
+    )
     poisson: float = key(
         "a number in (-1, 0.5); use 0.49 with element 3-10-1-3 or 3843 for nearly incompressible material",
         gt=-1,
