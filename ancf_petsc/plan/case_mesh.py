@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from ancf_petsc.element.catalog import element
@@ -17,7 +18,9 @@ def mesh_file(case: Case) -> Path:
     """The file of a case's mesh; one of the program's bodies is made if it is not there. Raises CaseError."""
     asked = case.spec.mesh
     if asked.body is None:
-        return (case.folder / str(asked.file)).resolve()
+        return Path(
+            os.path.realpath(case.folder / str(asked.file))
+        )  # Path.resolve raises on links in a circle
     try:
         return made_mesh(
             Request(
