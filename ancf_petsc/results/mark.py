@@ -87,7 +87,7 @@ class Mark:
 def read_mark(folder: Path) -> dict[str, Any] | None:
     """What a mark says; None without one, empty for one that is not whole."""
     try:
-        text = (Path(folder) / MARK).read_text(encoding="utf-8")
+        text = file_text(Path(folder) / MARK)
     except (OSError, ValueError):
         return None
     with suppress(ValueError):

@@ -40,7 +40,9 @@ def _bytes(change: Callable[[bytearray, Random], bytearray | None]) -> Damage:
 
     def apply(folder: Path, main: Path, random: Random) -> None:
         files = sorted(path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
-        file = main if random.random() < 0.7 or not files else random.choice(files)
+        if not files:
+            return
+        file = main if random.random() < 0.7 and main in files else random.choice(files)
         data = bytearray(file.read_bytes())
         changed = change(data, random)
         file.write_bytes(data if changed is None else changed)

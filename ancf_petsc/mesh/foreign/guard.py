@@ -5,6 +5,7 @@ Libraries would follow such links to any file of the user's, or take memory with
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any, NoReturn
@@ -83,7 +84,7 @@ def _beside(path: Path, name: str) -> Path:
     if not name or place.is_absolute() or ".." in place.parts or name.startswith("~"):
         raise Refused(f"it names a data file that is not beside it: {name!r}")
     file = path.parent / place
-    if not file.is_file():
+    if not os.path.isfile(file):
         raise Refused(f"its data file {name!r} is missing")
     return file
 
