@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from ancf_petsc.errors import CaseError
+from ancf_petsc.results.tables import file_text
 
 MARK = "running.json"
 SPARE_BYTES = 65536  # blanks at the mark's end: on a full disk, removing the mark makes room for the summary

@@ -230,7 +230,7 @@ def write_apart(folder: Path) -> None:
     """Make the seeds in a process of its own: Gmsh and MPI stay out of this one."""
     code = "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[1]); from fuzzing.seeds import write_seeds; write_seeds(Path(sys.argv[2]))"
     command = [sys.executable, "-c", code, str(Path(__file__).resolve().parent.parent), str(folder)]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
 def show_one(folder: Path, kind: str, seed: int, number: int) -> int:
