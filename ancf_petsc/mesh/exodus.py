@@ -51,7 +51,7 @@ def read_exodus(path: Path) -> RawMesh:
     found = contents(path, "netcdf")
     try:
         return _Exodus(found, path).mesh()
-    except (KeyError, IndexError, ValueError, AttributeError, TypeError) as error:
+    except (KeyError, IndexError, ValueError, AttributeError, TypeError, OverflowError) as error:
         reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
         raise mesh_error(path)(f"not a mesh of Exodus ({reason})", cure=CURES["netcdf"]) from None
 

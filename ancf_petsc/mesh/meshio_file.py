@@ -134,7 +134,10 @@ def _cell_sets(mesh: Any, kinds: list[str], path: Path) -> Iterator[tuple[str, i
         for block, rows in enumerate(by_block):
             if rows is not None:
                 yield name, block, _rows(rows, len(mesh["cells"][block][1]), name, path)
+    sizes = [len(nodes) for _, nodes in mesh["cells"]]
     for key, by_block in mesh["cell_data"]:
+        if [len(tags) for tags in by_block] != sizes:
+            raise mesh_error(path)(f"the data {key} do not fit the cells", cure=CURE)
         if key == "cell_tags" and mesh["cell_tags"] is not None:
             names = dict(mesh["cell_tags"])
         elif key in TAGS:
@@ -155,6 +158,8 @@ def _point_sets(mesh: Any) -> Iterator[tuple[str, Integers]]:
     """Name, rows of the points."""
     yield from mesh["point_sets"]
     for key, (tags,) in mesh["point_data"]:
+        if len(tags) != len(mesh["points"]):
+            continue
         families = dict(mesh["point_tags"] or {}) if key == "point_tags" else _set_names(key, [tags])
         rows: dict[str, list[Integers]] = {}
         for tag, names in families.items():
@@ -176,6 +181,8 @@ def _tag_names(mesh: Any, dimension: int, tag: int) -> list[str]:
 
 def _set_names(key: str, data: list[np.ndarray]) -> dict[int, list[str]]:
     """Tag -> name where `key` is the names of sets joined by "-" and the data number them, -1 for none."""
+    if not data:
+        return {}
     names = key.split("-")
     tags = np.unique(np.concatenate([np.ravel(part) for part in data]))
     counted = tags.dtype.kind in "iu" and len(tags) and tags.min() >= -1 and tags.max() == len(names) - 1

@@ -48,7 +48,7 @@ def read_ordinary(path: Path) -> RawMesh | None:
         read = _read_22 if version == "2.2" else _read_41
         numbers, points, rows = read(sections, names)
         return raw_mesh(numbers, points, rows, names, path, notes)
-    except (NotOrdinary, ValueError, IndexError):
+    except (NotOrdinary, ValueError, IndexError, OverflowError):
         check_lines(path)
         return None
 
@@ -76,7 +76,7 @@ def check_lines(path: Path) -> None:
                 if version < 4
                 else counts[0] + counts[1] * (2 if name == "Nodes" and version > 4 else 1)
             )
-        except (ValueError, IndexError):
+        except (ValueError, IndexError, OverflowError):
             raise mesh_error(path)(f"${name} does not begin with how many they are", cure=CURE) from None
         if len(lines) - 1 != expected:
             raise mesh_error(path)(

@@ -23,7 +23,17 @@ from ancf_petsc.results.xdmf import CELL_KINDS, field_name, link_name
 if TYPE_CHECKING:
     import pyvista
 
-DAMAGE = (OSError, KeyError, ValueError, TypeError, AttributeError, RuntimeError, IndexError, Refused)
+DAMAGE = (
+    OSError,
+    KeyError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    RuntimeError,
+    IndexError,
+    OverflowError,
+    Refused,
+)
 """What h5py raises for files that are damaged or not ours."""
 
 Array = NDArray[Any]

@@ -105,7 +105,7 @@ def _line(process: subprocess.Popen, seconds: float) -> str | None:
 class Campaign:
     """Counts of what was tried with a seed, kept in a folder after every hundred inputs."""
 
-    def __init__(self, folder: Path, seed: int, *, keep: bool, again: bool) -> None:
+    def __init__(self, folder: Path, seed: int, *, keep: bool, again: bool, retry: bool = False) -> None:
         self.place = folder / f"seed{seed}" if keep else Path(tempfile.mkdtemp(prefix="ancf-fuzz-"))
         self.seed, self.keep = seed, keep
         if again and keep:
@@ -117,6 +117,10 @@ class Campaign:
             write_apart(self.seeds)
         self.done = self.place / "done.jsonl"
         self.findings = self.place / "findings.jsonl"
+        if retry:
+            kept = [row for row in self._rows() if row["outcome"] != "finding"]
+            self.done.write_text("".join(json.dumps(row) + "\n" for row in kept))
+            self.findings.unlink(missing_ok=True)
 
     def run(self, count: int, only: list[str], jobs: int) -> int:
         """Try what is left of `count` inputs; the number of findings."""
@@ -125,9 +129,9 @@ class Campaign:
         counts = {kind: max(1, round(count * SHARES[kind] / total)) for kind in kinds}
         tried = {(row["kind"], row["number"]) for row in self._rows()}
         left: Queue = Queue()
-        for number in range(max(counts.values())):
-            for kind in kinds:
-                if number < counts[kind] and (kind, number) not in tried:
+        for kind in kinds:  # one after the other: a process then needs the libraries of few
+            for number in range(counts[kind]):
+                if (kind, number) not in tried:
                     left.put((kind, number))
         print(
             f"{len(tried)} inputs were tried before, {left.qsize()} are left; findings go to {self.findings}",

@@ -20,6 +20,8 @@ NUMBERS = (
     "+", ".", "1.5", "3.0000000001", "1d5", "\u0663", "1e", "", "abc", "*", "1" * 400,
 )  # fmt: skip
 """What stands in the place of a number."""
+RENAMED = "renamed.txt"
+"""Beside the input's folder: the main file's new name."""
 HUGE = (2**31 - 1, 2**31, 2**32 - 1, 2**40, 2**62, 2**63 - 1, 10**9, 10**12, 0, 1)
 FOREIGN = (
     "*TIE, NAME=a\nb, c", "*NGEN\n1, 1000000000, 1", "*NODE\n1, 1, 2", "*ELEMENT, TYPE=XYZ\n1, 2", "*NSET, NSET=z, GENERATE\n1, 1000000000000, 1",
@@ -221,7 +223,7 @@ def other_suffix(folder: Path, main: Path, random: Random) -> None:
     )
     renamed = main.with_name(main.name.split(".")[0] + suffix)
     main.rename(renamed)
-    (folder / "RENAMED").write_text(renamed.name)
+    (folder.parent / RENAMED).write_text(renamed.name)
 
 
 def special_file(folder: Path, main: Path, random: Random) -> None:

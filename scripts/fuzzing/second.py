@@ -23,7 +23,7 @@ class Unsupported(Exception):
 
 def corners(path: Path, kind: str, element: str) -> np.ndarray:
     """Corners (e, k, 3) of the body's cells as the second reader has them. Raises anything."""
-    return {"msh_text": _gmsh, "msh_binary": _gmsh, "inp": _meshio, "bdf": _pynastran, "exodus": _vtk_exodus, "vtu": _vtk_xml,
+    return {"msh_text": _gmsh, "msh_binary": _gmsh, "inp": _meshio, "bdf": _pynastran, "exodus": _exodus_by_hand, "vtu": _vtk_xml,
             "vtk": _vtk_legacy, "xdmf": _xdmf_by_hand, "med": _med_by_hand, "medit": _gmsh}[kind](path, element)  # fmt: skip
 
 
@@ -107,9 +107,20 @@ def _vtk_legacy(path: Path, element: str) -> np.ndarray:
     return _of_vtk(_silent(vtkUnstructuredGridReader(), path).GetOutput(), element)
 
 
-def _vtk_exodus(path: Path, element: str) -> np.ndarray:
-    """meshio's reader of Exodus; VTK's takes names of blocks it makes itself."""
-    return _meshio(path, element)
+def _exodus_by_hand(path: Path, element: str) -> np.ndarray:
+    """Coordinates and connectivity of all blocks of the kind, by netCDF4 alone."""
+    import netCDF4
+
+    title, width = {"3413": ("TET", 4), "3813": ("HEX", 8)}[element]
+    with netCDF4.Dataset(path) as data:
+        axes = [np.asarray(data[f"coord{axis}"][:], float) for axis in "xyz"]
+        blocks = [one for name, one in data.variables.items() if re.fullmatch(r"connect\d+", name)]
+        rows = [
+            np.asarray(one[:])
+            for one in blocks
+            if one.elem_type.upper().startswith(title) and one.shape[1] == width
+        ]
+    return np.stack(axes, axis=1)[np.concatenate(rows) - 1]
 
 
 def _xdmf_by_hand(path: Path, element: str) -> np.ndarray:
