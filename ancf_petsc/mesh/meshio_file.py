@@ -134,6 +134,11 @@ def _cell_sets(mesh: Any, kinds: list[str], path: Path) -> Iterator[tuple[str, i
         for block, rows in enumerate(by_block):
             if rows is not None:
                 yield name, block, _rows(rows, len(mesh["cells"][block][1]), name, path)
+    yield from _tagged_cells(mesh, kinds, path)
+
+
+def _tagged_cells(mesh: Any, kinds: list[str], path: Path) -> Iterator[tuple[str, int, Integers]]:
+    """The same of data that number sets."""
     sizes = [len(nodes) for _, nodes in mesh["cells"]]
     for key, by_block in mesh["cell_data"]:
         if [len(tags) for tags in by_block] != sizes:

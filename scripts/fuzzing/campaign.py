@@ -11,20 +11,15 @@ import sys
 import tempfile
 import threading
 import time
-from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 from queue import Empty, Queue
 from typing import Any
 
 from fuzzing.seeds import PROJECT
+from fuzzing.tally import SHARES, outcome, shown, tally
 
 RESULTS = PROJECT / "docs" / "verification" / "fuzz.json"
-SHARES = {
-    "case": 4000, "msh_text": 2400, "msh_binary": 1800, "inp": 2000, "bdf": 1800, "exodus": 1400, "vtu": 1600, "vtk": 1200,
-    "xdmf": 1600, "med": 800, "medit": 700, "other": 1200, "results": 500,
-}  # fmt: skip
-"""Inputs of each kind out of their sum."""
 LONGEST = 10.0
 """Seconds of processor time that an input may take; the machine may have other work, so that it waits for PATIENCE."""
 PATIENCE = 60.0
@@ -50,7 +45,8 @@ class Worker:
         environment.setdefault("ANCF_CACHE_DIR", str(Path.home() / ".cache"))
         process = subprocess.Popen(
             [sys.executable, str(program), str(self.seeds), str(self.room)],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True, cwd=self.room, env=environment, start_new_session=True,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True, cwd=self.room, env=environment,
+            start_new_session=True,
         )  # fmt: skip
         log.close()
         if _line(process, STARTING) is None:
@@ -78,7 +74,9 @@ class Worker:
         what = "hangs" if line is None else "crash"
         code = self.stop(dying=line == "")
         seconds = time.perf_counter() - begun
-        return {"code": what, "seconds": seconds, "busy": seconds, "grown": 0, "wrong": [f"{what} (exit {code}) after {seconds:.1f} s"], "said": "", "second": "", "damage": ["unknown"], "words": []}  # fmt: skip
+        wrong = [f"{what} (exit {code}) after {seconds:.1f} s"]
+        unknown = {"grown": 0, "said": "", "second": "", "damage": ["unknown"], "words": []}
+        return {"code": what, "seconds": seconds, "busy": seconds, "wrong": wrong, **unknown}
 
     def stop(self, *, dying: bool = False) -> int | None:
         if self.process is None:
@@ -191,48 +189,12 @@ class Campaign:
             print(f"{left} left", flush=True)
 
 
-def outcome(answer: dict[str, Any]) -> str:
-    if answer["wrong"]:
-        return "finding"
-    return {0: "accepted", 2: "refused", 3: "ended early"}.get(answer["code"], str(answer["code"]))
-
-
-def tally(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Counts by kind and outcome, by damage and outcome, what second readers say."""
-    kinds: dict[str, Any] = {}
-    for kind in SHARES:
-        own = [row for row in rows if row["kind"] == kind]
-        if own:
-            seconds = [row["second"].partition(":")[0] for row in own if row["second"]]
-            kinds[kind] = {"inputs": len(own), **Counter(row["outcome"] for row in own), "second": dict(sorted(Counter(seconds).items())),
-                           "longest_seconds": max(row["seconds"] for row in own), "most_memory_bytes": max(row["grown"] for row in own)}  # fmt: skip
-    meshes = [row for row in rows if row["kind"] not in ("results", "case")]
-    damages = Counter(name for row in meshes for name in row["damage"])
-    return {
-        "inputs": len(rows),
-        "findings": sum(row["outcome"] == "finding" for row in rows),
-        "kinds": kinds,
-        "damages": dict(sorted(damages.items())),
-    }
-
-
-def shown(table: dict[str, Any]) -> str:
-    lines = [f"{table['inputs']} inputs, {table['findings']} findings"]
-    for kind, row in table["kinds"].items():
-        counts = ", ".join(
-            f"{value} {key}"
-            for key, value in row.items()
-            if key in ("accepted", "refused", "ended early", "finding")
-        )
-        lines.append(
-            f"{kind:<11}{row['inputs']:>6}: {counts}; second reader: {row['second']}; at most {row['longest_seconds']:.1f} s, {row['most_memory_bytes'] / 2**20:.0f} MiB"
-        )
-    return "\n".join(lines)
-
-
 def write_apart(folder: Path) -> None:
     """Make the seeds in a process of its own: Gmsh and MPI stay out of this one."""
-    code = "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[1]); from fuzzing.seeds import write_seeds; write_seeds(Path(sys.argv[2]))"
+    code = (
+        "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[1]); "
+        "from fuzzing.seeds import write_seeds; write_seeds(Path(sys.argv[2]))"
+    )
     command = [sys.executable, "-c", code, str(Path(__file__).resolve().parent.parent), str(folder)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 

@@ -127,7 +127,7 @@ def _xdmf_by_hand(path: Path, element: str) -> np.ndarray:
     """Geometry and the mixed topology that meshio writes, by h5py and numpy alone."""
     from xml.etree import ElementTree
 
-    grid = ElementTree.parse(path).getroot().find(".//Grid")
+    grid = ElementTree.parse(path).getroot().find(".//Grid")  # noqa: S314  in a process of its own, of limited memory
     assert grid is not None
     geometry, topology = grid.find("Geometry/DataItem"), grid.find("Topology")
     assert geometry is not None

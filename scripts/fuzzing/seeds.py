@@ -49,14 +49,20 @@ def brick():
 
 SETS = {"wall": [[0, 1], []], "lower": [[], [0]], "upper": [[], [1]]}
 BY_MESHIO = {
-    "vtu": [("zlib.vtu", {}), ("lzma.vtu", {"compression": "lzma"}), ("plain.vtu", {"compression": None}), ("ascii.vtu", {"binary": False})],
+    "vtu": [
+        ("zlib.vtu", {}), ("lzma.vtu", {"compression": "lzma"}), ("plain.vtu", {"compression": None}),
+        ("ascii.vtu", {"binary": False}),
+    ],
     "vtk": [("binary.vtk", {}), ("ascii.vtk", {"binary": False}), ("old.vtk", {"file_format": "vtk42"})],
     "xdmf": [("hdf.xdmf", {}), ("xml.xdmf", {"data_format": "XML"}), ("raw.xdmf", {"data_format": "Binary"})],
     "med": [("m.med", {})],
     "medit": [("m.mesh", {}), ("m.meshb", {})],
     "other": [
         (name, {})
-        for name in ("m.ugrid", "m.su2", "m.avs", "m.cgns", "m.h5m", "m.dat", "m.post", "m.f3grid", "m.mdpa", "m.node", "m.vol", "m.wkt", "m.xml", "m.hmf", "m.stl", "m.ply", "m.off")
+        for name in (
+            "m.ugrid", "m.su2", "m.avs", "m.cgns", "m.h5m", "m.dat", "m.post", "m.f3grid", "m.mdpa", "m.node", "m.vol", "m.wkt",
+            "m.xml", "m.hmf", "m.stl", "m.ply", "m.off",
+        )
     ],
 }  # fmt: skip
 """Formats that meshio writes: file and options, by kind."""
@@ -92,7 +98,7 @@ def _write_msh(folder: Path) -> list[tuple[str, str, str]]:
             write_two_bricks(folder / f"{name}.msh", version=version, binary=binary)
             made.append(("msh_binary" if binary else "msh_text", f"{name}.msh", "3413"))
     (folder / "hand.msh").write_text(TWO)
-    nodes = [line for line in TWO.partition("$Nodes\n")[2].partition("$EndNodes")[0].splitlines()]
+    nodes = TWO.partition("$Nodes\n")[2].partition("$EndNodes")[0].splitlines()
     rows = ["1 4 1 1 4 10 11 20 30", "2 4 1 1 4 11 20 30 41"]
     (folder / "old.msh").write_text("\n".join(["$NOD", *nodes, "$ENDNOD", "$ELM", "2", *rows, "$ENDELM", ""]))
     quadratic = quadratic_bricks(folder)

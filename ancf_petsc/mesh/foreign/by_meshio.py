@@ -16,9 +16,10 @@ from ancf_petsc.mesh.foreign.guard import Refused, one_line
 def contents(path: Path, words: list[str]) -> dict[str, Any]:
     """meshio's mesh as tables and arrays, and what it says while it reads.
 
-    known: whether meshio reads this format at all. points (n, d). cells: kind and nodes (m, k); of polyhedra, whose cells have different numbers of nodes, (m, 0). cell_sets, cell_data:
-    name and a list by block of cells; point_sets, point_data, field_data: name and array. cell_tags, point_tags: tag and names
-    of MED's families. Raises Refused where meshio cannot read it; it prints, and may leave the interpreter, when it cannot.
+    known: whether meshio reads this format at all. points (n, d). cells: kind and nodes (m, k); of polyhedra, whose cells have
+    different numbers of nodes, (m, 0). cell_sets, cell_data: name and a list by block of cells; point_sets, point_data,
+    field_data: name and array. cell_tags, point_tags: tag and names of MED's families. Raises Refused where
+    meshio cannot read it; it prints, and may leave the interpreter, when it cannot.
     """
     del words
     if not set(path.suffixes) & set(meshio.extension_to_filetypes):
@@ -41,7 +42,7 @@ def contents(path: Path, words: list[str]) -> dict[str, Any]:
         "cell_data": _tags(mesh.cell_data),
         "point_sets": list(mesh.point_sets.items()),
         "point_data": _tags({key: [data] for key, data in mesh.point_data.items()}),
-        "field_data": [(name, np.ravel(value)) for name, value in mesh.field_data.items() if np.asarray(value).dtype.kind in "iu"],
+        "field_data": _pairs(mesh.field_data),
         "cell_tags": _families(mesh, "cell_tags"),
         "point_tags": _families(mesh, "point_tags"),
         "said": " ".join(said.getvalue().split()),
@@ -77,6 +78,12 @@ def _tags(data: dict[str, list[Any]]) -> list[tuple[str, list[np.ndarray]]]:
             if all(np.array_equal(part, np.floor(part)) for part in whole if part.dtype.kind == "f"):
                 found.append((name, whole))
     return found
+
+
+def _pairs(data: dict[str, Any]) -> list[tuple[str, np.ndarray]]:
+    """Numbers of field data, in which Gmsh keeps tag and dimension of a name."""
+    flat = [(name, np.ravel(value)) for name, value in data.items()]
+    return [(name, value) for name, value in flat if value.dtype.kind in "iuf"]
 
 
 def _families(mesh: Any, name: str) -> list[tuple[int, list[str]]] | None:

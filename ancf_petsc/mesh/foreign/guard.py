@@ -1,4 +1,4 @@
-"""What a file may not hold: XML with entities of its own, names of files elsewhere, HDF5 that leads out of the file or is not there.
+"""What a file may not hold: XML with entities, names of files elsewhere, HDF5 that leads out of the file or is not there.
 
 Libraries would follow such links to any file of the user's, or take memory without end.
 """

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 MEMORY, MEMORY_PER_BYTE = 768 * 2**20, 60
-"""Bytes beyond what the process has when it starts to read, and for each byte of the file; of text every number becomes an object."""
+"""Bytes beyond what the process has when it starts to read, and for each byte of the file: a number of a text becomes an object."""
 UNPACKED = 10
 """Times as much for files that are packed as a whole (.gz)."""
 

@@ -26,7 +26,7 @@ CURES = {
 STARTING = 120.0
 """Seconds a process may take to load a library: network drives are slow."""
 PATIENCE, SLOWEST = 8.0, 1e5
-"""Seconds to read, and bytes a second: damaged counts keep libraries busy for ever; they read whole files a hundred times faster."""
+"""Seconds, and bytes a second: damaged counts keep libraries busy for ever; they read whole files a hundred times faster."""
 LONGEST_REASON = 300
 """Letters of what a library says."""
 TITLES = {"gmsh": "Gmsh", "meshio": "meshio", "netcdf": "netCDF4"}
@@ -35,7 +35,7 @@ TITLES = {"gmsh": "Gmsh", "meshio": "meshio", "netcdf": "netCDF4"}
 def contents(path: Path, reader: str, *words: str) -> Any:
     """What a library finds in a file: see the modules by_*. reader: "gmsh", "meshio" or "netcdf".
 
-    Raises MeshError where it refuses the file, crashes on it or does not come to an end; EnvironmentProblem where it is not installed.
+    Raises MeshError where it refuses the file, crashes on it or does not come to an end, EnvironmentProblem without it.
     """
     size = _size(path)
     seconds = PATIENCE + size / SLOWEST
@@ -97,7 +97,11 @@ def start(words: list[str], home: str) -> tuple[Any, int]:
 
     home: an empty folder; what libraries keep for their user goes there.
     """
-    code = f"import sys; sys.path.append({os.fspath(Path(ancf_petsc.__file__).parent.parent)!r}); from ancf_petsc.mesh.foreign import child; child.main(sys.argv[1:])"
+    place = os.fspath(Path(ancf_petsc.__file__).parent.parent)
+    code = (
+        f"import sys; sys.path.append({place!r}); "
+        "from ancf_petsc.mesh.foreign import child; child.main(sys.argv[1:])"
+    )
     # A library built with MPI must not take itself for a rank of this run.
     environment = {
         k: v for k, v in os.environ.items() if not k.startswith((*OF_A_LAUNCHER, "OMPI_", "PMI", "MPI_"))
