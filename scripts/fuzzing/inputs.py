@@ -78,6 +78,8 @@ class Attempt:
     def _damage(self, main: Path, ways: tuple[damage.Damage, ...]) -> None:
         """One to three ways, one after the other; a file that a way cannot open stays as it is."""
         for _ in range(self.random.choice((0, 1, 1, 1, 1, 1, 1, 2, 3)) if self.number else 0):
+            if not os.path.isfile(main) and not self.damages[-1:] == ["other_suffix"]:
+                return  # a device, a pipe, a folder: nothing more can be done to it
             way = self.random.choice(ways)
             self.damages.append(way.__name__)
             with contextlib.suppress(
