@@ -14,12 +14,13 @@ from math import ceil, isclose
 import numpy as np
 from petsc4py import PETSc
 
-from ancf_petsc.errors import Interrupted
+from ancf_petsc.errors import Interrupted, NoEquilibrium
 from ancf_petsc.solve.critical import Watch
 from ancf_petsc.solve.events import CriticalPoint, Crossing
 from ancf_petsc.solve.extrapolation import Extrapolation
 from ancf_petsc.solve.newton import Newton, Outcome
 from ancf_petsc.solve.stability import why_it_ends
+from ancf_petsc.solve.step_control import StepControl
 
 LONGEST_FIRST_STEP = 0.1
 QUICK, SLOW = 5, 9
@@ -101,6 +102,7 @@ class LoadPath:
         self.x = start or self.assembly.reference_vector()
         self.watch = Watch(newton)
         self._crossing = Crossing(self.watch, on_bifurcation, on_event)
+        self._limit: int | None = None  # of steps, where the path is only tried
         self._rate = np.inf  # of the last step: largest change of a component over that of s
         self._at_hand = False  # whether the linear solver holds a tangent of the last trial
         self._past = Extrapolation()
@@ -126,6 +128,9 @@ class LoadPath:
                 trial.destroy()
                 self._shorten(target, outcome.reason)
                 continue
+            if self._limit is not None:
+                found = target, trial
+                break
             at_output = target in self.marks.outputs
             found = self._crossing.judge(
                 self.s,
@@ -157,11 +162,33 @@ class LoadPath:
             self.newton.factor_from_now_on(self.s)
             return
         if size < self.smallest_step:
+            if self._limit is not None:
+                raise NoEquilibrium(reason)
             limit = self._crossing.limit_point(self.s, self.x, self.smallest_step)
             raise why_it_ends(self.newton, self.x, self.s, reason, self.smallest_step, limit)
         log.info("  step to s = %.6g failed (%s): halved to %.3g", target, reason, size)
         self.newton.control.note("halved", reason, self.s, size)
         self._step = size
+
+    def try_beyond(self, target: float, least: float, most: int) -> tuple[float, PETSc.Vec]:
+        """How far a path from here leads towards `target` by steps down to `least`, and at most so many: pseudo-time and state."""
+        trial = LoadPath(self.newton, Marks.of([target], self.marks.corners), least, start=self.x.copy())
+        trial.s, trial._limit, trial._step = self.s, most, (target - self.s) / 4
+        trial._past.forget()
+        trial._past.add(self.s, trial.x)
+        control, self.newton.control = self.newton.control, StepControl()
+        try:
+            for _ in range(most):
+                trial._advance()
+                if trial.s >= target or self.interrupted():
+                    break
+        except NoEquilibrium:
+            pass
+        finally:
+            self.newton.control = control
+            trial.watch.destroy()
+            trial._past.forget()
+        return trial.s, trial.x
 
     def _target(self) -> float:
         """Where the next step ends: on the next mark, or on an equal part of the way to it."""
