@@ -7,7 +7,6 @@ from pathlib import Path
 from ancf_petsc.element.catalog import element
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input.load import Case
-from ancf_petsc.mesh.made import Request, made_mesh
 from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.mesh.read import read_mesh
 from ancf_petsc.mesh.refine import refine
@@ -18,6 +17,8 @@ def mesh_file(case: Case) -> Path:
     asked = case.spec.mesh
     if asked.body is None:
         return (case.folder / str(asked.file)).resolve()
+    from ancf_petsc.mesh.made import Request, made_mesh  # making meshes is rare, and takes time to import
+
     try:
         return made_mesh(
             Request(
