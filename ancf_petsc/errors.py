@@ -8,10 +8,11 @@ from __future__ import annotations
 import errno
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 
 class AncfError(Exception):
@@ -70,16 +71,22 @@ class MeshError(CaseError):
     """The mesh cannot be read or cannot be computed with."""
 
 
-class NoEquilibrium(AncfError):
+class Stopped(AncfError):
+    """What ended a path or a motion early. facts: its kind and what is known of it, for `end` of the summary."""
+
+    exit_code = 3
+
+    def __init__(self, message: str, facts: Mapping[str, Any] | None = None) -> None:
+        super().__init__(message)
+        self.facts = dict(facts or {})
+
+
+class NoEquilibrium(Stopped):
     """The load path ends: no further state was found. Everything up to here is saved."""
 
-    exit_code = 3
 
-
-class MotionStopped(AncfError):
+class MotionStopped(Stopped):
     """The motion cannot be followed further: a step failed or numbers are not finite. What was before is saved."""
-
-    exit_code = 3
 
 
 class EnvironmentProblem(AncfError):

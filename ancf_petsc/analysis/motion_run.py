@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ from ancf_petsc.model.motion_work import MotionWork, Powers
 from ancf_petsc.motion.integration import TimeIntegration
 from ancf_petsc.motion.integrators import Integrator, Step
 from ancf_petsc.parallel.exchange import combined
+from ancf_petsc.solve.step_control import StepControl
+from ancf_petsc.solve.weakest import weakest_cell
 
 MOTION_COUNTS = (*COUNTS, "rejected_steps")
 log = logging.getLogger(STEPS)
@@ -44,6 +47,8 @@ class MotionRun:
         self.duration = self.equations.duration
         self.times = set(times)
         self.totals = dict.fromkeys(MOTION_COUNTS, 0)
+        self.control = StepControl("time")
+        self.end: dict[str, Any] = {}
         self._since = dict.fromkeys(MOTION_COUNTS, 0)
         model = self.assembly.model
         self.work = MotionWork(model.drives, model.loads, self.duration)
@@ -68,6 +73,10 @@ class MotionRun:
                 self._write()
             raise
         finally:
+            self.end = {
+                "time": self.integrator.time,
+                **weakest_cell(self.assembly, self.integrator.x).facts(),
+            }
             self.path.destroy()
 
     # --- steps
@@ -78,6 +87,10 @@ class MotionRun:
         ):
             self.totals[name] += count
             self._since[name] += count
+        if step.rejected:
+            self.control.note(
+                "rejected", "its error is above the tolerance", step.time, step.size, count=step.rejected
+            )
         log.debug(
             "    t %.9g: steps %d, newton %d, linear %d, rejected %d",
             step.time, step.count, step.newton, step.linear, step.rejected,

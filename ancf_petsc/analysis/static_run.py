@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -24,6 +25,7 @@ from ancf_petsc.solve.load_path import LoadPath, Marks, PathStep
 from ancf_petsc.solve.newton import Newton
 from ancf_petsc.solve.rise import Rise, begins_loaded, rising
 from ancf_petsc.solve.stability import beyond_the_law
+from ancf_petsc.solve.weakest import weakest_cell
 
 log = logging.getLogger(STEPS)
 RISE = tuple(k / 10 for k in range(1, 11))
@@ -55,6 +57,8 @@ class StaticRun:
         self.totals = dict.fromkeys(COUNTS, 0)
         self.events: list[dict] = []
         self.doubts: str | None = None
+        self.control = newton.control
+        self.end: dict[str, Any] = {}
         self._since = dict.fromkeys(COUNTS, 0)
         model = self.assembly.model
         ramps = [drive.ramp for drive in model.drives] + [load.ramp for load in model.loads]
@@ -84,7 +88,9 @@ class StaticRun:
             path.run()
         except (NoEquilibrium, Interrupted):
             self._save_last_state(path)
+            self._note_end(path)
             raise
+        self._note_end(path)
         self._note_doubts(path.s, path.x)
         self._note_imbalance()
 
@@ -112,9 +118,12 @@ class StaticRun:
                 ),
             )
         except NoEquilibrium as error:
-            raise NoEquilibrium(f"before pseudo-time 0, where loads and moves come up: {error}") from error
+            raise NoEquilibrium(
+                f"before pseudo-time 0, where loads and moves come up: {error}", error.facts
+            ) from error
         finally:
             self.work.total = work.total
+            self.control.add(rise.newton.control, "before pseudo-time 0: ")
 
     def _count(self, step: PathStep) -> None:
         for name, count in zip(COUNTS, (step.newton, step.linear, 1), strict=True):
@@ -160,6 +169,9 @@ class StaticRun:
                 'statics.control = "arc_length"'
             )
             log.warning("%s", self.doubts)
+
+    def _note_end(self, path: LoadPath | ArcLength) -> None:
+        self.end = {"pseudo_time": path.s, **weakest_cell(self.assembly, path.x).facts()}
 
     def _load_at(self, s: float) -> list[float]:
         """The sum of the loads at s."""

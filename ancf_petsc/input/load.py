@@ -36,10 +36,6 @@ class Case:
     name: str
     text: str
 
-    @property
-    def mesh_file(self) -> Path:
-        return (self.folder / self.spec.mesh.file).resolve()
-
     def with_changes(self, changes: Mapping[str, Any]) -> Case:
         """The case with other values at dotted paths, such as {"material.law": "neo_hooke"}.
 

@@ -33,6 +33,7 @@ STRAIGHT, SHARPEST = 0.95, 0.7
 MOST_AT_LIMIT, LEVEL = 6, 1e-3
 """Trials for a limit point, and the rate of s over that at the ends of the step that is level enough."""
 ASTRAY = 'the path leads elsewhere; statics.control = "load" names its limit points'
+LOST = {"kind": "lost_definiteness"}
 EXACT = 1e-9
 """Reduction that iterative solvers are asked for."""
 log = logging.getLogger("ancf")
@@ -97,8 +98,8 @@ class ArcLength:
                 if self.s == 1.0:
                     return
                 if self.s < -1.0:
-                    raise NoEquilibrium(f"the load factor fell to {self.s:.6g}: {ASTRAY}")
-            raise NoEquilibrium(f"{MOST_STEPS} steps by arc length did not lead to s = 1: {ASTRAY}")
+                    raise NoEquilibrium(f"the load factor fell to {self.s:.6g}: {ASTRAY}", LOST)
+            raise NoEquilibrium(f"{MOST_STEPS} steps by arc length did not lead to s = 1: {ASTRAY}", LOST)
         finally:
             self.watch.destroy()
 
@@ -115,10 +116,10 @@ class ArcLength:
                     break
                 reason = "the path turns too sharply in it"
             if self._size / 2 < self.smallest_step:
-                why = why_it_ends(self.newton, self.x, self.s, reason, self.smallest_step)
-                raise NoEquilibrium(why)
+                raise why_it_ends(self.newton, self.x, self.s, reason, self.smallest_step)
             self._size /= 2
             log.info("  step by arc length failed (%s): halved to %.3g", reason, self._size)
+            self.newton.control.note("halved", reason, here.s, self._size)
         pieces = [(here, there, found)]
         if here.rate * there.rate < 0.0:
             pieces = self._at_limit(here, there, found)
@@ -183,8 +184,7 @@ class ArcLength:
         linear.ask_for(EXACT)
         linear.ksp.solve(rhs, answer)
         if linear.gave_up():
-            log.info("  the tangent is not positive definite: factoring from now on")
-            linear.fall_back_to_direct()
+            self.newton.factor_from_now_on(self.s)
             self.newton.tangent_at(x)
             linear.ksp.solve(rhs, answer)
         values = answer.array_r.copy()
@@ -258,7 +258,7 @@ class ArcLength:
         self.newton.set_pseudo_time(here.s)
         self.on_event(event, here.x)
         if stop:
-            raise NoEquilibrium(event.words())
+            raise NoEquilibrium(event.words(), {"kind": "lost_definiteness"})
 
     def _outputs_between(self, here: Point, there: Point) -> None:
         """Equilibria at exactly the outputs' pseudo-times between two points, in the order of the path."""

@@ -113,7 +113,7 @@ class Crossing:
     def stop_if_asked(self) -> None:
         """Raise NoEquilibrium where the path was to end at a critical point, and has reached it."""
         if self._ends is not None:
-            raise NoEquilibrium(self._ends.words())
+            raise NoEquilibrium(self._ends.words(), {"kind": "lost_definiteness"})
 
     def limit_point(self, s: float, x: PETSc.Vec, smallest: float) -> CriticalPoint | None:
         """The limit point that a path ends at, if the lowest eigenvalue falls to 0 over its last states as it does there:
@@ -142,8 +142,7 @@ class Crossing:
         watch, newton, count = self.watch, self.newton, self.watch.negative
         assert self._stable is not None
         if newton.linear.is_cheap_to_factor and not newton.linear.direct:
-            log.info("  the tangent is not positive definite: factoring from now on")
-            newton.linear.fall_back_to_direct()
+            newton.factor_from_now_on(s)
         start = self._stable.s
         known = Known(target, trial.copy(), watch.history[-1][1])
         before, after, where = watch.locate(self._stable, known)
@@ -177,7 +176,7 @@ class Crossing:
 
     def _branch(self, s: float, before: Known, after: Known, mode: NDArray, unstable):
         """The stable state beside the path at s, and what was done in words; the unstable one where there is none."""
-        self.newton.linear.fall_back_to_direct()
+        self.newton.factor_from_now_on(s, "the stable branch is looked for")
         x = before.x.copy()
         if after.s > before.s:
             part = (s - before.s) / (after.s - before.s)

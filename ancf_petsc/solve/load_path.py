@@ -14,7 +14,7 @@ from math import ceil, isclose
 import numpy as np
 from petsc4py import PETSc
 
-from ancf_petsc.errors import Interrupted, NoEquilibrium
+from ancf_petsc.errors import Interrupted
 from ancf_petsc.solve.critical import Watch
 from ancf_petsc.solve.events import CriticalPoint, Crossing
 from ancf_petsc.solve.extrapolation import Extrapolation
@@ -138,8 +138,9 @@ class LoadPath:
             )
             if found is not None:
                 break
-            log.info("  step to s = %.6g led to an unstable state: shortened", target)
             self._step = (target - self.s) / 4
+            log.info("  step to s = %.6g led to an unstable state: shortened", target)
+            self.newton.control.note("shortened", "it led to an unstable state", self.s, self._step)
         s, x = found
         step = PathStep(
             s, s - self.s, outcome.newton, outcome.linear, outcome.residuals, s in self.marks.outputs
@@ -153,13 +154,13 @@ class LoadPath:
         """After a step that failed: another linear solver, half the step, or the end of the path."""
         linear, size = self.newton.linear, (target - self.s) / 2
         if linear.gave_up() and (linear.is_cheap_to_factor or size < self.smallest_step):
-            log.info("  the tangent is not positive definite: factoring from now on")
-            linear.fall_back_to_direct()
+            self.newton.factor_from_now_on(self.s)
             return
         if size < self.smallest_step:
             limit = self._crossing.limit_point(self.s, self.x, self.smallest_step)
-            raise NoEquilibrium(why_it_ends(self.newton, self.x, self.s, reason, self.smallest_step, limit))
+            raise why_it_ends(self.newton, self.x, self.s, reason, self.smallest_step, limit)
         log.info("  step to s = %.6g failed (%s): halved to %.3g", target, reason, size)
+        self.newton.control.note("halved", reason, self.s, size)
         self._step = size
 
     def _target(self) -> float:
@@ -176,6 +177,11 @@ class LoadPath:
             outcome = self._solve(target, trial)
             if outcome.converged:
                 return trial, outcome
+            self.newton.control.note(
+                "predictor",
+                f"extrapolated states did not do ({outcome.reason}): the tangent predicts",
+                self.s,
+            )
             trial.destroy()
         trial = self.x.copy()
         self.newton.predict(trial, self.s, target)
@@ -188,6 +194,7 @@ class LoadPath:
             careful = self._solve(target, predicted, careful=True)
             if careful.converged:
                 log.info("  step to s = %.6g: %s; with a line search it is found", target, outcome.reason)
+                self.newton.control.note("line search", outcome.reason, self.s)
                 trial, predicted, outcome = predicted, trial, careful
         predicted.destroy()
         return trial, outcome

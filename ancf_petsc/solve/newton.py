@@ -6,6 +6,7 @@ shorter one. Such a state is never accepted. Convergence: |R| <= tolerance x max
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,9 @@ from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.forcing import Forcing
 from ancf_petsc.solve.linear.solver import LinearSolver
 from ancf_petsc.solve.petsc import default_options, is_given
+from ancf_petsc.solve.step_control import StepControl
 
+log = logging.getLogger("ancf")
 MOST_ITERATIONS = 25
 QUICK, CAREFUL = "basic", "bt"
 """PETSc's line searches: whole steps of Newton's method; those cut back to where the out-of-balance force falls."""
@@ -43,12 +46,15 @@ class Outcome:
 
 
 class Newton:
-    """Solves Q(x) = Q_e(s) for the free degrees of freedom, the driven ones being in place."""
+    """Solves Q(x) = Q_e(s) for the free degrees of freedom, the driven ones being in place. control: what was changed on the
+    way.
+    """
 
     def __init__(self, assembly: Assembly, tolerance: float) -> None:
         self.assembly = assembly
         self.comm = assembly.comm
         self.tolerance = tolerance
+        self.control = StepControl()
         self.matrix = assembly.create_matrix()
         self._external = assembly.external_force(0.0)
         self._residuals: list[float] = []
@@ -90,6 +96,13 @@ class Newton:
         self._snes.setUp()
         self.linear.ksp.setUp()
         x.destroy()
+
+    def factor_from_now_on(self, s: float, why: str = "the tangent is not positive definite") -> None:
+        """Leave iterative linear solvers, at pseudo-time s."""
+        if not self.linear.direct:
+            log.info("  %s: factoring from now on", why)
+            self.control.note("factored", why, s)
+        self.linear.fall_back_to_direct()
 
     def set_pseudo_time(self, s: float) -> None:
         """Loads as they are at s."""

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
+from ancf_petsc.errors import NoEquilibrium
 from ancf_petsc.material.models import LAWS
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.events import CriticalPoint
 from ancf_petsc.solve.linear.solver import negative_pivots_of
 from ancf_petsc.solve.newton import Newton
+from ancf_petsc.solve.weakest import stretches, weakest_cell
 
 NEAR_SOFTEST = 0.1
 """Added to the stretch at which a law is softest: a weakest element below is taken for the reason."""
@@ -19,26 +20,6 @@ CRUSHED = 0.1
 """Of det F: no law here was measured there."""
 PAST_A_LIMIT = 'a displacement in place of the force, or statics.control = "arc_length", goes past it'
 LARGEST_TO_FACTOR = 300_000
-ALIKE = 1e-6
-"""Stretches of cells that differ by less, relatively, are taken as equal: rounding depends on the number of ranks."""
-
-
-def weakest_cell(assembly: Assembly, x: PETSc.Vec) -> tuple[float, float, int, np.ndarray, str]:
-    """Smallest principal stretch of all cells, with det F, the cell's number, its undeformed centroid, its law.
-
-    Of cells that are stretched alike, the one with the lowest number, whatever the number of ranks. Collective.
-    """
-    model = assembly.model
-    stretch, det = _stretches(assembly, x)
-    least = combined(assembly.comm, float(stretch.min(initial=np.inf)), MPI.MIN)
-    alike = np.flatnonzero(stretch <= least * (1.0 + ALIKE))
-    found = (np.inf, 0.0, np.iinfo(np.int64).max, np.zeros(3), "")
-    if len(alike):
-        e = int(alike[np.argmin(model.cell_numbers[alike])])
-        law = next(region.law.name for region in model.regions if region.first <= e < region.last)
-        centroid = model.origin + model.reference[model.position_cells()[e]].mean(axis=0)
-        found = (float(stretch[e]), float(det[e]), int(model.cell_numbers[e]), centroid, law)
-    return min(assembly.comm.allgather(found), key=lambda item: item[2])
 
 
 def beyond_the_law(assembly: Assembly, x: PETSc.Vec) -> str | None:
@@ -46,7 +27,7 @@ def beyond_the_law(assembly: Assembly, x: PETSc.Vec) -> str | None:
     nothing does. Collective.
     """
     model, comm = assembly.model, assembly.comm
-    stretch, det = _stretches(assembly, x)
+    stretch, det = stretches(assembly, x)
     own, weak = model.numbering.own_cells, np.zeros(len(det), bool)
     for region in model.regions:
         if region.law.softest is not None:
@@ -55,22 +36,14 @@ def beyond_the_law(assembly: Assembly, x: PETSc.Vec) -> str | None:
     beyond, crushed, total = combined(comm, counts)
     if not beyond and not crushed:
         return None
-    smallest, volume, cell, centroid, law = weakest_cell(assembly, x)
-    place = ", ".join(f"{c:.6g}" for c in centroid)
-    worst = f"element {cell} at ({place}) has a stretch of {smallest:.3f}, det F {volume:.3f}"
+    weakest = weakest_cell(assembly, x)
     if beyond:
         return (
-            f"{beyond} of {total} elements are pressed so far that {law} carries the less the more they are pressed: {worst}; "
+            f"{beyond} of {total} elements are pressed so far that {weakest.law} carries the less the more they are pressed, "
+            f"{weakest.words()}; "
             f"forces depend on the mesh there: {_laws_without_limit()} has no such limit"
         )
-    return f"{crushed} of {total} elements are crushed below {CRUSHED:g} of their volume: {worst}; take a finer mesh there"
-
-
-def _stretches(assembly: Assembly, x: PETSc.Vec) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest principal stretch and det F (e,) of this rank's cells."""
-    strain, _, det = assembly.fields(x)
-    squares = np.linalg.eigvalsh(2 * strain.reshape(-1, 3, 3) + np.eye(3))[:, 0]
-    return np.sqrt(np.maximum(squares, 0.0)), det
+    return f"{crushed} of {total} elements are crushed below {CRUSHED:g} of their volume, {weakest.words()}; take a finer mesh"
 
 
 def why_it_ends(
@@ -80,21 +53,21 @@ def why_it_ends(
     reason: str,
     smallest_step: float,
     limit: CriticalPoint | None = None,
-) -> str:
-    """One line for the user. Collective."""
+) -> NoEquilibrium:
+    """The error to raise. Collective."""
     assembly = newton.assembly
-    stretch, det, cell, centroid, law = weakest_cell(assembly, x)
+    weakest = weakest_cell(assembly, x)
     pivots = None
     if limit is None and assembly.model.dof <= LARGEST_TO_FACTOR:
         assembly.tangent(x, newton.matrix)
         pivots = negative_pivots_of(newton.matrix.mat)
-    place = ", ".join(f"{c:.6g}" for c in centroid)
     line = (
         f"no equilibrium beyond pseudo-time {s:.6g}: steps of {smallest_step:g} still fail ({reason}); "
-        f"{limit.words() if limit else _definiteness(pivots)}; "
-        f"weakest element {cell} at ({place}): smallest stretch {stretch:.3f}, det F {det:.3f}"
+        f"{limit.words() if limit else _definiteness(pivots)}; weakest {weakest.words()}"
     )
-    return f"{line}; {_cure(law, stretch, pivots, limit)}"
+    kind = "limit_point" if limit else "lost_definiteness" if pivots else "step_too_long"
+    facts = {"kind": kind, "pseudo_time": s, **weakest.facts()}
+    return NoEquilibrium(f"{line}; {_cure(weakest.law, weakest.stretch, pivots, limit)}", facts)
 
 
 def _definiteness(pivots: int | None) -> str:
