@@ -11,7 +11,7 @@ from ancf_petsc.errors import CaseError, did_you_mean
 from ancf_petsc.input.schema import CaseSpec
 from ancf_petsc.model.ramp import make_ramp
 from ancf_petsc.plan.outputs import motion_times, output_times
-from ancf_petsc.study.spec import At, QuantitySpec
+from ancf_petsc.studies.spec import At, QuantitySpec
 
 SAME = 1e-9
 """Points of a path closer than this part of the largest are one."""
@@ -53,10 +53,11 @@ def check_quantity(name: str, asked: QuantitySpec, spec: CaseSpec, file: Path) -
     points = outputs(spec, asked.at.column)
     if points is not None and nearest(points, asked.at.value) is None:
         raise CaseError(
-            f"no output there, and values between outputs are not made up: {shown(asked.at.column, points)}",
+            "no output there",
             file=file,
             key=f"quantity.{name}.at",
             got={asked.at.column: asked.at.value},
+            expected=f"an output, for nothing is made up between them: {shown(asked.at.column, points)}",
             cure=how_to_ask(spec, asked.at),
         )
 

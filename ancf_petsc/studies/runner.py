@@ -17,10 +17,10 @@ from pathlib import Path
 
 from ancf_petsc.errors import CaseError, Interrupted
 from ancf_petsc.results.mark import refuse_live_run
-from ancf_petsc.study.ending import RunEnd, one_line, read_end, summary_of
-from ancf_petsc.study.process import PATIENCE, Load, Process
-from ancf_petsc.study.record import Busy, add_to_record, held, read_record, record_file
-from ancf_petsc.study.runs import StudyRun, described, version
+from ancf_petsc.studies.ending import RunEnd, one_line, read_end, summary_of
+from ancf_petsc.studies.process import PATIENCE, Load, Process
+from ancf_petsc.studies.record import Busy, add_to_record, held, read_record, record_file
+from ancf_petsc.studies.runs import StudyRun, described, version
 
 log = logging.getLogger("ancf")
 POLL = 0.05
@@ -185,7 +185,7 @@ class Runner:
         words = end.outcome if end else "interrupted"
         count = f"run {len(self._ended)} of {len(self._runs)}"
         more = f": {end.reason}" if end and end.reason else ""
-        log.info("%s, %s: %s, %.3g s%s", count, described(run.changes), words, process.seconds, more)
+        log.info("%s, %s: %s, %.3g s%s", count, run.label, words, process.seconds, more)
         self.changed()
         self._show()
 
@@ -206,7 +206,7 @@ class Runner:
         if seconds:
             alone = load.left_alone(_used() - used, self.ranks)
             add_to_record(self.folder, run.name, seconds=seconds, alone=alone, ranks=self.ranks)
-            log.info("%s: %.4g s alone", described(run.changes), seconds["total"])
+            log.info("%s: %.4g s alone", run.label, seconds["total"])
 
     def _show(self) -> None:
         ended = list(self._ended.values())

@@ -50,7 +50,9 @@ def read_end(folder: Path, identity: str, version: str, record: dict[str, Any]) 
     if code is None or code == 0:
         return None
     outcome = "timeout" if record.get("timeout") else OUTCOMES.get(code, "crashed")
-    return RunEnd("failed", outcome, one_line(reason), summary if ours else {}, final=outcome == "wrong_input")
+    return RunEnd(
+        "failed", outcome, one_line(reason), summary if ours else {}, final=outcome == "wrong_input"
+    )
 
 
 def summary_of(folder: Path) -> dict[str, Any]:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from ancf_petsc.errors import CaseError, did_you_mean
 from ancf_petsc.results.tables import read_table
-from ancf_petsc.study.columns import SAME, nearest, shown
-from ancf_petsc.study.ending import summary_of
-from ancf_petsc.study.spec import At, QuantitySpec
+from ancf_petsc.studies.columns import SAME, nearest, shown
+from ancf_petsc.studies.ending import summary_of
+from ancf_petsc.studies.spec import At, QuantitySpec
 
 Column = NDArray[np.float64]
 TIMES = ("time", "pseudo_time")

@@ -9,12 +9,12 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import AfterValidator, PlainValidator, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from ancf_petsc.errors import CaseError, did_you_mean
+from ancf_petsc.errors import did_you_mean
 from ancf_petsc.input.load import as_tuples, refuse_nul
 from ancf_petsc.input.messages import case_error
-from ancf_petsc.input.types import Name, Table, key, problem
+from ancf_petsc.input.types import Name, Table, key, one_of, problem
 from ancf_petsc.post.charts.spec import ChartSpec
-from ancf_petsc.study.chart_spec import chart_problems
+from ancf_petsc.studies.chart_spec import chart_problems
 
 PAGE = "docs/study.md has examples"
 ABSCISSAS = ("stroke", "time", "pseudo_time")
@@ -23,9 +23,9 @@ REDUCTIONS = ("max", "min", "mean", "rms", "drift")
 COMPARED = ("max", "mean", "rms")
 """Reductions that a difference of two series can be measured by."""
 RESERVED = (
-    "status outcome reason elements dof h ranks steps newton linear solve_seconds total_seconds "
-    "seconds_alone memory_peak_bytes run"
-).split()
+    "status", "outcome", "reason", "elements", "dof", "h", "ranks", "steps", "newton", "linear",
+    "solve_seconds", "total_seconds", "seconds_alone", "memory_peak_bytes", "run",
+)  # fmt: skip
 """Columns of study.csv that no quantity may take the name of."""
 
 
@@ -138,7 +138,9 @@ class QuantitySpec(Table):
 
     column: Name | None = key('a column of curve.csv or probes.csv; such as "force"', None)
     at: AtKey | None = key('"end" or { stroke | time | pseudo_time = a number }', None)
-    reduce: Literal["max", "min", "mean", "rms", "drift"] | None = key("a reduction over all outputs", None)
+    reduce: Annotated[str, one_of(lambda: REDUCTIONS, "a reduction over all outputs")] | None = key(
+        'a reduction over all outputs; such as "max"', None
+    )
     against: Literal["reference"] | None = key('"reference"; the series is compared with its series', None)
     summary: Name | None = key('a value of summary.json; such as "end.smallest_stretch"', None)
 

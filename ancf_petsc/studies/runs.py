@@ -15,10 +15,10 @@ from ancf_petsc.errors import CaseError
 from ancf_petsc.input.load import Case
 from ancf_petsc.input.messages import shown
 from ancf_petsc.input.overrides import SET
-from ancf_petsc.study.columns import check_quantity
-from ancf_petsc.study.facts import Facts, estimate, facts_of
-from ancf_petsc.study.read import Study
-from ancf_petsc.study.record import read_record
+from ancf_petsc.studies.columns import check_quantity
+from ancf_petsc.studies.facts import Facts, estimate, facts_of
+from ancf_petsc.studies.read import Study
+from ancf_petsc.studies.record import read_record
 
 REMOVED = ""
 """The value that takes a key away, as `--set KEY=` does."""
@@ -27,11 +27,13 @@ Changes = tuple[tuple[str, Any], ...]
 
 @dataclass(frozen=True)
 class StudyRun:
-    """One run. changes: (path, value) beyond the base case. name: its hash. identity: hash of case and mesh alone. base_text: the base
-    case as TOML.
+    """One run.
 
-    facts: sizes; None for a case that cannot be planned on its mesh, whose error is in `problem`. in_table: whether it is a
-    row of study.csv, not a further run of a reference.
+    changes: (path, value) beyond the base case. name: its hash. identity: hash of case and mesh alone. base_text: the
+    base case as TOML.
+
+    facts: sizes; None for a case that cannot be planned on its mesh, whose error is in `problem`. in_table: whether it
+    is a row of study.csv, not a further run of a reference. values: of the varied keys. label: those that differ, in words.
     """
 
     changes: Changes
@@ -44,6 +46,7 @@ class StudyRun:
     problem: str = ""
     in_table: bool = True
     values: dict[str, Any] = field(default_factory=dict)
+    label: str = "the case as it is"
 
 
 def runs_of(study: Study, runs_folder: Path) -> list[StudyRun]:
@@ -60,10 +63,22 @@ def runs_of(study: Study, runs_folder: Path) -> list[StudyRun]:
         if source.kind == "run":
             run = _named(study, source.changes, f"reference.{name}")
             found.setdefault(run.name, replace(run, in_table=False))
-    sized = [_sized(run, runs_folder) for run in found.values()]
+    sized = [_sized(run, runs_folder) for run in _labelled(study, list(found.values()))]
     if all(run.facts is None for run in sized):
         raise CaseError(sized[0].problem)
     return sorted(sized, key=lambda run: (run.seconds, run.name))
+
+
+def _labelled(study: Study, runs: list[StudyRun]) -> list[StudyRun]:
+    """Runs with the keys that tell them apart as their label."""
+    differing = [key for key in study.spec.keys if len({repr(run.values.get(key)) for run in runs}) > 1]
+    labels = [
+        described(tuple((key, run.values.get(key)) for key in differing))
+        if run.in_table
+        else described(run.changes)
+        for run in runs
+    ]
+    return [replace(run, label=label or run.label) for run, label in zip(runs, labels, strict=True)]
 
 
 def combinations(study: Study) -> Iterator[tuple[str, Changes]]:
@@ -103,9 +118,7 @@ def _named(study: Study, changes: Changes, where: str) -> StudyRun:
     """A combination as a checked case with its hash."""
     label = f"{study.file}: {where}: {described(changes)}"
     try:
-        case = study.base.with_changes(
-            {path: None if value == REMOVED else value for path, value in changes}
-        )
+        case = study.base.with_changes({path: None if value == REMOVED else value for path, value in changes})
         element(case.spec.mesh.element)
         known = identity(case)
     except CaseError as error:

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ancf_petsc.errors import CaseError
-from ancf_petsc.study.facts import step_count
-from ancf_petsc.study.ladders import COUNTS, MESH, MESHES, NUMBERS, Line, ladder_keys, lines_of, size_of
-from ancf_petsc.study.quantity import Tables, value_of
-from ancf_petsc.study.read import Study
-from ancf_petsc.study.richardson import ASYMPTOTIC
-from ancf_petsc.study.rows import Row
-from ancf_petsc.study.runs import described, reference_run
-from ancf_petsc.study.spec import QuantitySpec, Source
+from ancf_petsc.studies.facts import step_count
+from ancf_petsc.studies.ladders import COUNTS, MESH, MESHES, NUMBERS, Line, ladder_keys, lines_of, size_of
+from ancf_petsc.studies.quantity import Tables, value_of
+from ancf_petsc.studies.read import Study
+from ancf_petsc.studies.richardson import ASYMPTOTIC
+from ancf_petsc.studies.rows import Row
+from ancf_petsc.studies.runs import described, reference_run
+from ancf_petsc.studies.spec import QuantitySpec, Source
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,17 @@ class Reference:
         return abs(found / self.value - 1.0) if self.value else abs(found)
 
 
+def check_files(study: Study) -> None:
+    """Raise CaseError where a reference's CSV file is not there, or has nothing to compare with."""
+    for name, source in study.spec.reference.items():
+        if source.kind == "file":
+            tables, asked = _file(study, name, source), study.spec.quantity[name]
+            if asked.against:
+                tables.column(asked.column or "")
+            else:
+                _value_in_file(study, name, tables)
+
+
 def series_of(study: Study, name: str, rows: Sequence[Row]) -> Tables | None:
     """The tables a quantity's series is compared with, None where they are not there yet."""
     source = study.spec.reference[name]
@@ -51,21 +62,17 @@ def series_of(study: Study, name: str, rows: Sequence[Row]) -> Tables | None:
     return finest.tables if finest else None
 
 
-def reference_of(
-    study: Study, name: str, rows: Sequence[Row], lines: Sequence[Line]
-) -> Reference:
+def reference_of(study: Study, name: str, rows: Sequence[Row], lines: Sequence[Line]) -> Reference:
     """The reference of a quantity from what has run. lines: the quantity's ladders. Raises CaseError for a wrong file."""
     asked, source = study.spec.quantity[name], study.spec.reference[name]
     if asked.against:
-        return Reference(source.kind, 0.0, None, "the series is compared with the reference's: its error is itself")
+        return Reference(
+            source.kind, 0.0, None, "the series is compared with the reference's: its error is itself"
+        )
     if source.kind == "number":
         return Reference("number", source.value, None, "a number of the study file")
     if source.kind == "file":
-        try:
-            value = value_of(asked, _file(study, name, source))
-        except CaseError as error:
-            raise CaseError(str(error), file=study.file, key=f"reference.{name}") from None
-        return Reference("file", value, None, source.file)
+        return Reference("file", _value_in_file(study, name, _file(study, name, source)), None, source.file)
     if source.kind == "run":
         wanted = reference_run(study, name)
         found = next((row.found.get(name) for row in rows if row.run.name == wanted), None)
@@ -87,6 +94,13 @@ def _file(study: Study, name: str, source: Source) -> Tables:
             expected="a CSV file, from the study's folder",
         )
     return Tables(path)
+
+
+def _value_in_file(study: Study, name: str, tables: Tables) -> float:
+    try:
+        return value_of(study.spec.quantity[name], tables)
+    except CaseError as error:
+        raise CaseError(str(error), file=study.file, key=f"reference.{name}") from None
 
 
 def _finest(rows: Sequence[Row]) -> Row | None:
@@ -117,14 +131,14 @@ def _of_finest(name: str, asked: QuantitySpec, rows: Sequence[Row], lines: Seque
     return Reference("finest", finest.found[name], max(gaps) if gaps else None, words)
 
 
-def _of_lines(
-    keys: Sequence[str], rows: Sequence[Row], lines: Sequence[Line], source: Source
-) -> Reference:
+def _of_lines(keys: Sequence[str], rows: Sequence[Row], lines: Sequence[Line], source: Source) -> Reference:
     """Of all ladders along one key the limit that is least uncertain, checked against the others."""
     table = [row for row in rows if row.run.in_table]
     key = source.key or next(iter(ladder_keys(keys, table)), "")
     if not key:
-        return Reference("richardson", None, None, "no key of the study makes levels: vary a size, a step or a tolerance")
+        return Reference(
+            "richardson", None, None, "no key of the study makes levels: vary a size, a step or a tolerance"
+        )
     ours = _finest_of_others([line for line in lines if line.key == key], key)
     good = [line for line in ours if line.result.verdict == ASYMPTOTIC]
     if not good:
@@ -132,12 +146,14 @@ def _of_lines(
         return Reference("richardson", None, None, f"along {key}: {said or 'no levels yet'}")
     best = min(good, key=lambda line: line.result.uncertainty or 0.0)
     limit, uncertainty = best.result.limit, best.result.uncertainty
-    assert limit is not None and uncertainty is not None
+    assert limit is not None
+    assert uncertainty is not None
     words = f"limit along {key} {_name(best)}{best.result.words}"
     apart = 0.0
     for line in good:
         other = line.result
-        assert other.limit is not None and other.uncertainty is not None
+        assert other.limit is not None
+        assert other.uncertainty is not None
         beyond = abs(other.limit - limit) - other.uncertainty - uncertainty
         if line is not best and beyond > 0:
             apart = max(apart, abs(other.limit - limit) - other.uncertainty)

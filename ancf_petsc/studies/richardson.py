@@ -122,8 +122,9 @@ def _problem(
     """Why levels that go one way are still no convergence; empty where nothing speaks against it."""
     finest = triples[-1]
     if finest is None or not ORDERS[0] < finest[0] < ORDERS[1]:
-        order = "none fits" if finest is None else f"{finest[0]:.2g}"
-        return f"the order ({order}) is outside {ORDERS[0]:g} to {ORDERS[1]:g}"
+        if finest is None:
+            return "differences between levels do not shrink as sizes do: no order fits"
+        return f"the order {finest[0]:.2g} is outside {ORDERS[0]:g} to {ORDERS[1]:g}"
     if stretch is not None and stretch[-1] < FOLDED and stretch[-1] < stretch[-2] - DEEPER:
         return (
             f"the smallest stretch falls with refinement, to {stretch[-1]:.2f}: surfaces fold there, "

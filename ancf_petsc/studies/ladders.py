@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ancf_petsc.study.richardson import Extrapolation, Ladder, extrapolate
-from ancf_petsc.study.rows import Row
-from ancf_petsc.study.spec import QuantitySpec
+from ancf_petsc.studies.richardson import Extrapolation, Ladder, extrapolate
+from ancf_petsc.studies.rows import Row
+from ancf_petsc.studies.spec import QuantitySpec
 
 MESHES = ("mesh.size", "mesh.refine", "mesh.divisions", "mesh.rim", "mesh.file")
 """Keys that make meshes finer: the size of a level is that of its elements."""
@@ -22,7 +22,7 @@ MESH = "mesh"
 
 @dataclass(frozen=True)
 class Line:
-    """A ladder of one quantity. key: what its levels differ in. values: of the other keys, the same for all.
+    """A ladder of one quantity. key: what its levels differ in. values: of the other keys that runs differ in.
 
     rows: finished ones, coarse to fine. sizes: of the levels.
     """
@@ -37,7 +37,9 @@ class Line:
 
 def ladder_keys(keys: Sequence[str], rows: Sequence[Row]) -> list[str]:
     """The keys of a study that make ladders, the most telling first; MESH where mesh keys do so together only."""
-    differing = [key for key in LADDERS if key in keys and len({_text(row.run.values[key]) for row in rows}) > 1]
+    differing = [
+        key for key in LADDERS if key in keys and len({_text(row.run.values[key]) for row in rows}) > 1
+    ]
     meshes = [key for key in differing if key in MESHES]
     if len(meshes) > 1 and max(_longest(key, keys, rows) for key in meshes) < 3:
         return [MESH, *(key for key in differing if key not in MESHES)]
@@ -49,7 +51,7 @@ def lines_of(
 ) -> list[Line]:
     """The ladders along a key, one for each combination of the others."""
     together = [name for name in keys if name in MESHES] if key == MESH else [key]
-    others = [name for name in keys if name not in together]
+    others = [name for name in keys if name not in together and _differs(name, rows)]
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(_text([row.run.values[name] for name in others]), []).append(row)
@@ -103,6 +105,10 @@ def _longest(key: str, keys: Sequence[str], rows: Sequence[Row]) -> int:
         others = _text([row.run.values[name] for name in keys if name != key])
         groups.setdefault(others, set()).add(_text(row.run.values[key]))
     return max((len(levels) for levels in groups.values()), default=0)
+
+
+def _differs(key: str, rows: Sequence[Row]) -> bool:
+    return len({_text(row.run.values[key]) for row in rows}) > 1
 
 
 def _text(value: Any) -> str:

@@ -16,7 +16,7 @@ from ancf_petsc.errors import CaseError
 from ancf_petsc.input import toml
 from ancf_petsc.input.overrides import remove_value, set_value, split_path
 from ancf_petsc.launcher import environment, on_ranks
-from ancf_petsc.study.runs import REMOVED, StudyRun
+from ancf_petsc.studies.runs import REMOVED, StudyRun
 
 PATIENCE = 5.0
 """Seconds that a run has for a clean end when the study is interrupted; afterwards it is killed."""
@@ -29,8 +29,8 @@ class Process:
 
     def __init__(self, run: StudyRun, case_file: Path, folder: Path, ranks: int) -> None:
         self.run, self.folder = run, folder
-        words = [str(case_file), *_settings(run), "--out", str(folder), "--quiet"]
-        command = on_ranks(ranks, [sys.executable, "-m", "ancf_petsc", "run", *words])
+        words = run_words(run, case_file, folder)
+        command = on_ranks(ranks, [sys.executable, "-m", "ancf_petsc", *words])
         self._said = tempfile.TemporaryFile()  # noqa: SIM115
         self.begun = time.monotonic()
         # A group of its own: Ctrl-C on the terminal reaches the study, which ends its runs itself.
@@ -77,6 +77,11 @@ class Process:
     def _signal(self, number: int) -> None:
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, number)
+
+
+def run_words(run: StudyRun, case_file: Path, folder: Path) -> list[str]:
+    """What follows `ancf` on the command line of a run; a person repeats the run with it."""
+    return ["run", str(case_file), *_settings(run), "--out", str(folder), "--quiet"]
 
 
 def _settings(run: StudyRun) -> list[str]:

@@ -12,11 +12,11 @@ import numpy as np
 
 from ancf_petsc.errors import CaseError
 from ancf_petsc.results.reader import open_results
-from ancf_petsc.study.ending import RunEnd, one_line, read_end
-from ancf_petsc.study.quantity import Tables, row_of, value_of
-from ancf_petsc.study.record import read_record
-from ancf_petsc.study.runs import StudyRun, version
-from ancf_petsc.study.spec import QuantitySpec
+from ancf_petsc.studies.ending import RunEnd, one_line, read_end
+from ancf_petsc.studies.quantity import Tables, row_of, value_of
+from ancf_petsc.studies.record import read_record
+from ancf_petsc.studies.runs import StudyRun, version
+from ancf_petsc.studies.spec import QuantitySpec
 
 
 @dataclass

@@ -8,7 +8,7 @@ from pathlib import Path
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input import toml
 from ancf_petsc.input.load import CASE_FILE, Case, load_case
-from ancf_petsc.study.spec import StudySpec, check_study
+from ancf_petsc.studies.spec import StudySpec, check_study
 
 STUDY_FILE = "study.toml"
 
