@@ -32,6 +32,7 @@ VERBS = {
     "info": ("ancf_petsc.cli.info", "versions, elements, self-check"),
     "modes": ("ancf_petsc.cli.modes", "natural frequencies and shapes of a case's body"),
     "mesh": ("ancf_petsc.cli.mesh", "make one of the project's meshes at a size"),
+    "export": ("ancf_petsc.cli.export", "write a case as the input of another program, CalculiX"),
     "new": ("ancf_petsc.cli.new", "write a commented case to start from"),
     "bench": ("ancf_petsc.cli.bench", "time configurations with known answers"),
 }
