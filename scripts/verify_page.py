@@ -59,7 +59,9 @@ def checks_part(data: dict[str, Any]) -> list[str]:
 def platforms_part(rows: list[dict[str, Any]]) -> list[str]:
     """How the suite ended on each PETSc and MPI it was last run on."""
     lines = ["## Where the test suite ran", ""]
-    lines += ["| PETSc, SLEPc | MPI | system, Python | numpy, h5py | PETSc has | date | passed | failed | skipped |"]
+    lines += [
+        "| PETSc, SLEPc | MPI | system, Python | numpy, h5py | PETSc has | date | passed | failed | skipped |"
+    ]
     lines += ["|---|---|---|---|---|---|---|---|---|"]
     for row in rows:
         parallel = " with MPI" if row["h5py_with_mpi"] else " without MPI"

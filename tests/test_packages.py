@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+import tomllib
 
 import numpy as np
 import pytest
 import results_writer
 from mpi4py import MPI
+from packaging.requirements import Requirement
+from packaging.version import Version
 from petsc4py import PETSc
 from statics_cases import block
 
@@ -127,3 +131,31 @@ def test_a_wheel_holds_all_that_the_program_needs(project):
     """setuptools puts modules into it and nothing else, so that nothing else may lie in the package."""
     files = [file for file in (project / "ancf_petsc").rglob("*") if file.is_file() and file.suffix != ".pyc"]
     assert [file for file in files if file.suffix != ".py"] == []
+
+
+OF_CONDA = {"matplotlib": "matplotlib-base"}
+"""What conda-forge has under another name."""
+
+
+def test_the_environment_of_conda_has_every_requirement(project):
+    """Of the same smallest version at least: pip, which scripts/setup calls in it, then has nothing to replace."""
+    data = tomllib.loads((project / "pyproject.toml").read_text())["project"]
+    extras = data["optional-dependencies"]
+    asked = [Requirement(line) for line in (*data["dependencies"], *extras["solvers"], *extras["dev"])]
+    lines = (project / "environment.yml").read_text().partition("dependencies:\n")[2].splitlines()
+    given = {}
+    for line in lines:
+        name, sign, version = line.removeprefix("  - ").partition(">=")
+        given[name] = re.split("[,=]", version)[0] if sign else "0"
+    for requirement in asked:
+        if requirement.marker is not None and not requirement.marker.evaluate(
+            {"python_version": given["python"]}
+        ):
+            continue
+        name = OF_CONDA.get(requirement.name.lower(), requirement.name.lower())
+        assert name in given, name
+        low = max(
+            (Version(one.version) for one in requirement.specifier if one.operator == ">="),
+            default=Version("0"),
+        )
+        assert Version(given[name]) >= low, name
