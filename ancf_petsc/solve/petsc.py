@@ -29,6 +29,9 @@ PREFIX = re.compile(
     r"|fieldsplit_[a-z0-9]+_|st_|smoother_)"
 )
 NUMBER = re.compile(r"\d+")
+_REASONS = PETSc.SNES.ConvergedReason
+NOT_FINITE: int = getattr(_REASONS, "DIVERGED_FUNCTION_NANORINF", None) or _REASONS.DIVERGED_FNORM_NAN
+"""SNES's reason for a state whose residual is not a number; it has the first name from PETSc 3.25 on."""
 READ_LATE = re.compile(r"view|reason|monitor|draw|plot|mat_|test|check")  # during the solution or after it
 log = logging.getLogger("ancf")
 
