@@ -60,11 +60,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return leave.code if isinstance(leave.code, int) else int(leave.code is not None)
     except AncfError as error:
         return _print_error(error)
-    except ModuleNotFoundError as error:
-        if (error.name or "").startswith("ancf_petsc"):
+    except ImportError as error:
+        from ancf_petsc.cli.packages import import_problem
+
+        if (problem := import_problem(error, words[0])) is None:
             raise
-        cure = "run scripts/setup, or use environment.yml"
-        return _print_error(EnvironmentProblem(f"the Python package {error.name} is missing; {cure}"))
+        return _print_error(problem)
     except KeyboardInterrupt:
         _abort_others(Interrupted.exit_code)
         return _print_error(Interrupted("interrupted"))
