@@ -31,7 +31,7 @@ PRESSED = {"name": "block", "mesh": SMALL, "stroke": 0.001, "steps": 1}
 def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """Meshes that this process makes do not land in the user's cache; kernels stay where they are, compiled."""
     monkeypatch.setattr(
-        "ancf_petsc.bench.meshes.cache_folder", lambda: tmp_path_factory.getbasetemp() / "meshes"
+        "ancf_petsc.mesh.made.cache_folder", lambda: tmp_path_factory.getbasetemp() / "meshes"
     )
 
 

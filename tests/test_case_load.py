@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input import load_case, toml
 from ancf_petsc.input.overrides import petsc_table
+from ancf_petsc.plan.case_mesh import mesh_file
 
 TEXT = """\
 title = "block"
@@ -65,7 +66,7 @@ def test_name_folder_and_mesh_file(folder):
     case = load_case(folder)
     assert case.name == "block"
     assert case.folder == folder
-    assert case.mesh_file == folder.parent / "meshes" / "block.msh"
+    assert mesh_file(case) == folder.parent / "meshes" / "block.msh"
     (folder / "soft.toml").write_text(TEXT)
     assert load_case(folder / "soft.toml").name == "soft"
 

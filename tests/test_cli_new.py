@@ -8,6 +8,7 @@ from ancf_petsc import cli
 from ancf_petsc.cli.new import KINDS
 from ancf_petsc.input import load_case
 from ancf_petsc.mesh.read import read_mesh
+from ancf_petsc.plan.case_mesh import mesh_file
 
 
 @pytest.fixture(autouse=True)
@@ -21,8 +22,8 @@ def test_the_case_is_complete_and_finds_its_groups(here, kind, capsys):
     assert cli.main(["new", "first", "--kind", kind]) == 0
     assert "ancf run first" in capsys.readouterr().out
     case = load_case("first")
-    assert case.mesh_file.parent == here / "first"
-    groups = read_mesh(case.mesh_file, ("tetra",)).groups
+    assert mesh_file(case).parent == here / "first"
+    groups = read_mesh(mesh_file(case), ("tetra",)).groups
     entries = (*case.spec.constraint, *case.spec.load, *case.spec.probe)
     named = {entry.group for entry in entries if hasattr(entry, "group")}
     assert named <= set(groups)

@@ -20,6 +20,7 @@ from ancf_petsc.analysis.host.versions import program_version
 from ancf_petsc.errors import MeshError
 from ancf_petsc.input.load import Case
 from ancf_petsc.launcher import is_general_option
+from ancf_petsc.plan.case_mesh import mesh_file
 
 SHORT = 16  # hexadecimal digits: 64 bits distinguish any number of runs
 BLOCK = 1 << 22  # bytes read at once
@@ -50,7 +51,7 @@ class Identity:
 
 def identity(case: Case) -> Identity:
     """The identity of a case with all its changes. Raises MeshError where the mesh cannot be read."""
-    return Identity(case_hash(case), mesh_hash(case.mesh_file))
+    return Identity(case_hash(case), mesh_hash(mesh_file(case)))
 
 
 def case_hash(case: Case) -> str:

@@ -19,6 +19,7 @@ from ancf_petsc.analysis.identity import Identity, identity
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input.load import Case, case_from_text
 from ancf_petsc.log import RECORD
+from ancf_petsc.plan.case_mesh import mesh_file
 
 log = logging.getLogger(RECORD)
 
@@ -45,7 +46,7 @@ class Provenance:
                 "name": self.case.name,
                 "text": self.case.text,
             },
-            "mesh": {"file": str(self.case.mesh_file), "sha256": self.identity.mesh},
+            "mesh": {"file": str(mesh_file(self.case)), "sha256": self.identity.mesh},
             "date": self.date,
             "host": self.host,
             "command": self.command,
@@ -69,7 +70,7 @@ class Provenance:
         ranks = f"{self.ranks} rank{'s' * (self.ranks > 1)}"
         log.info("%s on %s, %s: %s", self.date, self.host, ranks, self.command)
         log.info("%s", ", ".join(f"{name} {version}" for name, version in self.versions.items()))
-        log.info("mesh %s, sha256 %s", self.case.mesh_file, self.identity.mesh)
+        log.info("mesh %s, sha256 %s", mesh_file(self.case), self.identity.mesh)
         log.info("case %s, hash %s; with all changes it reads", self.case.file or "", self.identity.hash)
         for line in self.case.text.splitlines():
             log.info("    %s", line)
@@ -91,15 +92,16 @@ def case_of_run(folder: str | Path, overrides: Sequence[str] = (), petsc_options
     said = _recorded(folder)
     source = Path(said["file"] or folder)
     case = case_from_text(said["text"], source, Path(said["folder"]), said["name"], overrides, petsc_options)
-    if str(Path(said["mesh_file"])) != str(case.mesh_file):
+    file = mesh_file(case)
+    if str(Path(said["mesh_file"])) != str(file):
         return case
     cure = "bring that file back, or name the mesh by --set mesh.file=FILE"
-    if not case.mesh_file.is_file():
-        raise CaseError("the mesh of this run is gone", file=case.mesh_file, key="--again", cure=cure)
+    if not file.is_file():
+        raise CaseError("the mesh of this run is gone", file=file, key="--again", cure=cure)
     if identity(case).mesh != said["mesh_sha256"]:
         raise CaseError(
             "the mesh is not the one of this run any more",
-            file=case.mesh_file,
+            file=file,
             key="--again",
             expected=f"sha256 {said['mesh_sha256']}",
             cure=cure,

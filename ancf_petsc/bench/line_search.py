@@ -11,10 +11,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ancf_petsc.analysis.build import build
-from ancf_petsc.bench.meshes import cache_folder, mesh_path
+from ancf_petsc.bench.meshes import mesh_path
 from ancf_petsc.bench.problems import block
 from ancf_petsc.errors import NoEquilibrium
 from ancf_petsc.input.load import case_from_dict
+from ancf_petsc.mesh.made import cache_folder
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import combined, on_root
 from ancf_petsc.solve.load_path import LoadPath, Marks

@@ -32,11 +32,10 @@ from ancf_petsc.bench.messages import exchange_cost, messages
 from ancf_petsc.bench.problems import PROBLEMS, block, block_force_234, reference_tip
 from ancf_petsc.bench.solvers import iterations
 from ancf_petsc.bench.yardstick import copy_rate, gather_time
-from ancf_petsc.element.catalog import element
 from ancf_petsc.errors import NoEquilibrium
 from ancf_petsc.input.load import Case, case_from_dict
-from ancf_petsc.mesh.read import read_mesh
 from ancf_petsc.parallel.exchange import on_root
+from ancf_petsc.plan.case_mesh import mesh_of
 from ancf_petsc.plan.plan import plan_on
 from ancf_petsc.results.reader import open_results
 from ancf_petsc.solve.linear import solver as linear_solver
@@ -107,10 +106,10 @@ def set_up(comm: MPI.Comm, *, problem: dict[str, Any], repetitions: int) -> Resu
     """Seconds from the mesh file to the first assembled tangent; reading the file is among the facts."""
     case = _case(comm, problem)
     seconds: dict[str, list[float]] = {name: [] for name in ("read", "tables", "distribute", "assemble")}
-    volume, kinds = 0.0, element(case.spec.mesh.element).kinds
+    volume = 0.0
     for _ in range(repetitions):
         clock = _Splits(comm, seconds)
-        mesh: Any = on_root(comm, lambda: read_mesh(case.mesh_file, kinds))
+        mesh: Any = on_root(comm, lambda: mesh_of(case))
         clock.split("read")
         plan = on_root(comm, partial(plan_on, case, mesh))
         clock.split("tables")

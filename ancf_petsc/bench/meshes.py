@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import re
 from pathlib import Path
 
 import ancf_petsc
 from ancf_petsc.errors import CaseError
-from ancf_petsc.mesh.generate import make_mesh
+from ancf_petsc.mesh.made import Request, made_mesh
 
 PROJECT = Path(ancf_petsc.__file__).resolve().parent.parent
 MADE = re.compile(
@@ -26,33 +25,18 @@ def mesh_path(name: str) -> Path:
     made = MADE.fullmatch(name)
     if made is None:
         return project_file("meshes", f"{name}.msh")
-    place = cache_folder() / f"{name.replace(':', '_')}.msh"
-    if not place.is_file():
-        place.parent.mkdir(parents=True, exist_ok=True)
-        _make(made, place)
-    return place
-
-
-def _make(made: re.Match[str], place: Path) -> None:
     bricks = "x" in made["how"]
-    draft = place.with_name(f"{os.getpid()}.msh")
-    make_mesh(
-        made["body"],
-        draft,
+    nx, ny, nz = (int(count) for count in made["how"].split("x")) if bricks else (0, 0, 0)
+    request = Request(
+        body=made["body"],
         size=None if bricks else float(made["how"]),
         rim=None if made["rim"] is None else float(made["rim"]),
-        divisions=[int(count) for count in made["how"].split("x")] if bricks else None,
-        order=2 if made["more"] == ":quadratic" else 1,
+        divisions=(nx, ny, nz) if bricks else None,
         hexahedra=made["more"] == ":hexahedra",
+        order=2 if made["more"] == ":quadratic" else 1,
         flat="line" if made["more"] == ":line" else "",
     )
-    draft.replace(place)
-
-
-def cache_folder() -> Path:
-    """Where made meshes are kept; ANCF_CACHE_DIR and XDG_CACHE_HOME move it."""
-    base = os.environ.get("ANCF_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "ancf_petsc" / "meshes"
+    return made_mesh(request)
 
 
 def project_file(*parts: str) -> Path:

@@ -91,17 +91,15 @@ def _step(results: Results, arguments: argparse.Namespace) -> int:
 
 
 def _show_case(arguments: argparse.Namespace) -> None:
-    from ancf_petsc.element.catalog import element
     from ancf_petsc.input.load import load_case
     from ancf_petsc.mesh.groups import choose_groups
-    from ancf_petsc.mesh.read import read_mesh
+    from ancf_petsc.plan.case_mesh import mesh_of
     from ancf_petsc.post import case_view
 
     if arguments.movie:
         raise CaseError("needs a finished run; this is a case", file=arguments.case, key="--movie")
     case = load_case(arguments.case, changes(arguments))
-    row = element(case.spec.mesh.element)
-    mesh = read_mesh(case.mesh_file, row.kinds, duplicates=case.spec.mesh.duplicates, element=row.code)
+    mesh = mesh_of(case)
     chosen = {name: group.model_dump(exclude_none=True) for name, group in case.spec.groups.items()}
     mesh.groups |= choose_groups(mesh, chosen, file=case.file)
     shown = (mesh, _supports(case, mesh), case.spec.title, case.spec.note)

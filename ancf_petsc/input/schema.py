@@ -22,6 +22,7 @@ from ancf_petsc.input.loads import ForceSpec, GravitySpec, LoadSpec
 from ancf_petsc.input.types import (
     Axes,
     Axis,
+    Count,
     Direction,
     DirectionKey,
     Name,
@@ -46,14 +47,46 @@ def laws() -> Mapping[str, Law]:
 
 
 class MeshSpec(Table):
-    """[mesh]: the file, from the case file's folder, and the element."""
+    """[mesh]: a file, from the case file's folder, or one of the program's bodies; and the element."""
 
-    file: Name = key('a file name; relative to the case file, such as "block.msh"')
+    file: Name | None = key('a file name; relative to the case file, such as "block.msh"', None)
+    body: Name | None = key('a name of `ancf mesh --list` in quotes; such as "pvc_block"', None)
+    size: float | None = key("a number > 0; length of edges of `body`, in metres", None, gt=0)
+    rim: float | None = key("a number > 0; length of edges at rims of bonded faces of `body`", None, gt=0)
+    divisions: tuple[Count, Count, Count] | None = key(
+        "three whole numbers >= 1; bricks of `body` along x, y, z, such as [4, 4, 8]", None
+    )
+    hexahedra: bool = key("true to leave the bricks of `divisions` whole", False)
+    flat: Literal["quad", "line"] | None = key('"quad" or "line"; a section or an axis of `body`', None)
     element: str = key(
         'a code of the catalogue, in quotes; such as "3413"', pattern=r"^(\d{4}|\d-\d+-\d-\d)(\+\d+)?$"
     )
+    refine: int = key("a whole number from 0 to 8; how often every element is divided", 0, ge=0, le=8)
     duplicates: Literal["error", "keep", "merge"] = key("what to do about coincident nodes", "error")
     rule: Literal["default", "reduced", "exact"] = key("a choice of quadrature", "default")
+
+    @model_validator(mode="after")
+    def _check(self) -> MeshSpec:
+        if self.body is None and self.file is None:
+            raise problem(
+                "missing",
+                at=["file"],
+                expected="a mesh file",
+                cure='or one of the program\'s bodies: body = "cube"',
+            )
+        if self.body is not None and self.file is not None:
+            raise problem(
+                "file and body given", at=["body"], got=self.body, expected="one of them", cure="drop one"
+            )
+        of_body = [name for name in ("size", "rim", "divisions", "hexahedra", "flat") if getattr(self, name)]
+        if self.file is not None and of_body:
+            raise problem(
+                at=[of_body[0]],
+                got=getattr(self, of_body[0]),
+                expected="body = ... with it: a mesh file has its own size",
+                cure="make a file finer by refine",
+            )
+        return self
 
 
 class GroupSpec(Table):

@@ -15,6 +15,7 @@ RAMPS = ("linear", "cosine", "constant")
 
 Axis = Literal["x", "y", "z"]
 Vector = tuple[float, float, float]
+Count = Annotated[int, Field(ge=1)]
 Ramp = Literal["linear", "cosine", "constant"] | tuple[tuple[float, float], ...]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +27,7 @@ def complete(mesh: Mesh, element: Element) -> None:
     cells = mesh.cells
     mesh.kind = KINDS[mesh.kind].linear or mesh.kind
     if cells.shape[1] > KINDS[mesh.kind].nodes:
-        _straighten(mesh, element)
+        straighten(mesh, [node.corners for node in element.nodes if len(node.corners) > 1])
         _complete_groups(mesh, element)
         return
     by_corners: dict[int, list[tuple[int, ...]]] = {}
@@ -37,14 +38,14 @@ def complete(mesh: Mesh, element: Element) -> None:
             _add_nodes(mesh, cells, np.array(places))
 
 
-def _straighten(mesh: Mesh, element: Element) -> None:
-    """Move mid-nodes onto the middle of their edge."""
+def straighten(mesh: Mesh, corners: Sequence[tuple[int, ...]]) -> None:
+    """Move nodes onto the middle of their edge: those after the corners of cells, whose edges have
+    these corners."""
     largest, count = 0.0, 0
-    for place, node in enumerate(element.nodes):
-        if len(node.corners) == 1:
-            continue
+    first = KINDS[KINDS[mesh.kind].linear or mesh.kind].nodes
+    for place, around in enumerate(corners, start=first):
         nodes = mesh.cells[:, place]
-        middle = mesh.points[mesh.cells[:, node.corners]].mean(axis=1)
+        middle = mesh.points[mesh.cells[:, around]].mean(axis=1)
         off = np.linalg.norm(mesh.points[nodes] - middle, axis=1)
         moved = off > MOVED * mesh.size
         largest, count = max(largest, off.max()), count + len(np.unique(nodes[moved]))

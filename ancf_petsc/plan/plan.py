@@ -19,7 +19,7 @@ from ancf_petsc.input.load import Case
 from ancf_petsc.mesh.complete import complete
 from ancf_petsc.mesh.groups import choose_groups
 from ancf_petsc.mesh.mesh import Mesh
-from ancf_petsc.mesh.read import read_mesh
+from ancf_petsc.plan.case_mesh import mesh_of
 from ancf_petsc.plan.curve import CurveChoice, choose_curve, enter_stroke
 from ancf_petsc.plan.loads import enter_loads
 from ancf_petsc.plan.locking import locking_notes
@@ -53,11 +53,8 @@ class Plan:
 
 def make_plan(case: Case) -> Plan:
     """Read the mesh and enter everything the case says into tables. Raises CaseError."""
-    spec = case.spec
     try:
-        row = element(spec.mesh.element)
-        mesh = read_mesh(case.mesh_file, row.kinds, duplicates=spec.mesh.duplicates, element=row.code)
-        return plan_on(case, mesh)
+        return plan_on(case, mesh_of(case))
     except CaseError as error:
         error.file = error.file or case.file
         raise

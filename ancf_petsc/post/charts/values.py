@@ -1,0 +1,116 @@
+"""A quantity of a study over one of its keys, predicted values beside it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ancf_petsc.post.charts.marks import (
+    Look,
+    draw_margin,
+    draw_points,
+    draw_predicted,
+    end_labels,
+    failure_words,
+    finish_chart,
+    grid_of_panels,
+    looks,
+    plain_ticks,
+    write_labels,
+)
+from ancf_petsc.post.charts.points import Line, Panel, Point, grouped, panel_rows
+from ancf_petsc.post.charts.predicted import predicted_lines
+from ancf_petsc.post.charts.spec import ChartSpec
+from ancf_petsc.post.charts.study_table import StudyTable
+from ancf_petsc.post.charts.words import axis_words, outcome_words, title_of, value_words
+from ancf_petsc.post.panels import style
+
+NAMED_ENDS = 14
+"""Charts with more runs that ended early leave their names to the CSV."""
+
+
+def value_panels(study: StudyTable, chart: ChartSpec) -> list[Panel]:
+    """A quantity over x; keys of words stand at the numbers of their values."""
+    x, quantity, panels = str(chart.x), str(chart.quantity), []
+    places = {} if study.is_numeric(x) else {value: k for k, value in enumerate(study.values(x))}
+    for value, rows in panel_rows(study, chart).items():
+        title = value_words(chart, str(chart.panels), value) if chart.panels else ""
+        panel = Panel(title, axis_words(study, chart, x), axis_words(study, chart, quantity))
+        panel.x, panel.y = chart.x_label or panel.x, chart.y_label or panel.y
+        for label, some in grouped(study, rows, chart).items():
+            points = [
+                Point(
+                    float(places[row.text(x)]) if places else row.number(x), row.number(quantity),
+                    ended=row.ended, outcome=row.outcome, run=row.text("run"),
+                )
+                for row in some
+            ]  # fmt: skip
+            panel.lines.append(_relative(Line(label, points)) if chart.relative else Line(label, points))
+        panel.predicted = predicted_lines(study, chart, rows, value)
+        panels.append(panel)
+    return [panel for panel in panels if panel.count > 1]
+
+
+def _relative(line: Line) -> Line:
+    """Over the value at the smallest x."""
+    first = line.shown[0].y if line.shown else float("nan")
+    return Line(line.label, [replace(point, y=point.y / first) for point in line.points]) if first else line
+
+
+def draw_values(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> Figure:
+    """Lines through the runs; a cross on a point whose run ended before its end, with the reason's short name."""
+    look = looks(line.label for panel in panels for line in panel.lines)
+    ends = [p for panel in panels for line in panel.lines for p in line.shown if not p.ended]
+    failed: list[Point] = []
+    with style():
+        figure, places = grid_of_panels(len(panels), wide=6.2 if len(panels) == 1 else 4.9, high=4.2)
+        labels = []
+        for axes, panel in zip(places, panels, strict=True):
+            _scale(axes, study, chart, panel)
+            axes.set_title(panel.title)
+            for line in panel.lines:
+                draw_points(axes, line, look[line.label])
+                _draw_ends(axes, line, look[line.label], named=len(ends) <= NAMED_ENDS)
+            predicted = draw_predicted(axes, panel)
+            failed += draw_margin(axes, panel.lines, look)
+            labels.append((axes, [*end_labels(panel.lines, look), *predicted]))
+        notes = (chart.note, failure_words(failed), _ends_words(ends))
+        finish_chart(figure, title_of(study, chart), notes)
+        write_labels(figure, labels)
+    return figure
+
+
+def _scale(axes: Axes, study: StudyTable, chart: ChartSpec, panel: Panel) -> None:
+    axes.set(xlabel=panel.x, ylabel=panel.y)
+    if study.is_numeric(str(chart.x)):
+        along = [p.x for line in panel.lines for p in line.points]
+        axes.set_xscale(chart.x_scale or _scale_of([x for x in along if x == x]))
+        plain_ticks(axes, along)
+    else:
+        names = [value_words(chart, str(chart.x), value) for value in study.values(str(chart.x))]
+        axes.set_xticks(range(len(names)), names)
+    axes.set_yscale(chart.y_scale or "linear")
+
+
+def _scale_of(values: list[float]) -> str:
+    """Logarithmic where positive values span more than a decade."""
+    return "log" if values and min(values) > 0 and max(values) > 10 * min(values) else "linear"
+
+
+def _draw_ends(axes: Axes, line: Line, look: Look, *, named: bool) -> None:
+    for point in line.shown:
+        if not point.ended:
+            axes.plot(point.x, point.y, "x", color="#000000", markersize=8, markeredgewidth=1.3, zorder=5)
+            if named:
+                axes.annotate(
+                    outcome_words(point.outcome), (point.x, point.y), xytext=(-6, 5), textcoords="offset points", ha="right",
+                    fontsize=7, color=look.colour, zorder=6,
+                )  # fmt: skip
+
+
+def _ends_words(ends: list[Point]) -> str:
+    return (
+        failure_words(ends, "Black crosses").replace("without an answer", "that ended before") if ends else ""
+    )
