@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from ancf_petsc.post.charts.marks import (
-    Label,
+    EndLabel,
     draw_predicted,
     finish_chart,
     grid_of_panels,
     swatch,
     write_labels,
 )
-from ancf_petsc.post.charts.points import Line, Panel, Point, panel_rows
+from ancf_petsc.post.charts.points import ChartLine, ChartPanel, ChartPoint, panel_rows
 from ancf_petsc.post.charts.predicted import predicted_lines
 from ancf_petsc.post.charts.spec import ChartSpec
 from ancf_petsc.post.charts.study_table import StudyRow, StudyTable
@@ -42,22 +42,22 @@ SHOWN_NUMBERS = 80
 """Maps of more cells show marks without numbers."""
 
 
-def map_panels(study: StudyTable, chart: ChartSpec) -> list[Panel]:
+def map_panels(study: StudyTable, chart: ChartSpec) -> list[ChartPanel]:
     """One panel a value of `panels`; its lines are outcomes, its points cells at the numbers of their values."""
     panels = []
     x, y = str(chart.x), chart.y[0]
     for value, rows in panel_rows(study, chart).items():
         title = value_words(chart, str(chart.panels), value) if chart.panels else ""
-        panel = Panel(title, axis_words(study, chart, x), axis_words(study, chart, y))
-        found: dict[str, list[Point]] = {}
+        panel = ChartPanel(title, axis_words(study, chart, x), axis_words(study, chart, y))
+        found: dict[str, list[ChartPoint]] = {}
         for row in rows:
             outcome = outcome_of(row, chart)
             place = (study.values(x).index(row.text(x)), study.values(y).index(row.text(y)))
             number = row.number(chart.quantity) if chart.quantity else float("nan")
             found.setdefault(outcome, []).append(
-                Point(*place, low=number, ended=row.ended, outcome=outcome, run=row.text("run"))
+                ChartPoint(*place, low=number, ended=row.ended, outcome=outcome, run=row.text("run"))
             )
-        panel.lines = [Line(outcome_words(outcome), points) for outcome, points in found.items()]
+        panel.lines = [ChartLine(outcome_words(outcome), points) for outcome, points in found.items()]
         panel.predicted = predicted_lines(study, chart, rows, value)
         panels.append(panel)
     return [panel for panel in panels if panel.count > 1]
@@ -69,7 +69,7 @@ def outcome_of(row: StudyRow, chart: ChartSpec) -> str:
     return "energy_grown" if grown and row.ended else "reached" if row.outcome == "done" else row.outcome
 
 
-def map_records(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> list[dict[str, object]]:
+def map_records(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -> list[dict[str, object]]:
     """Rows of the chart's CSV: values of both axes, not their places."""
     x, y = study.values(str(chart.x)), study.values(chart.y[0])
     rows: list[dict[str, object]] = []
@@ -92,7 +92,7 @@ def map_records(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> lis
     return rows
 
 
-def draw_map(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> Figure:
+def draw_map(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -> Figure:
     """Coloured cells with a mark each; the legend stands beside the panels."""
     x, y = study.values(str(chart.x)), study.values(chart.y[0])
     wide, high = (max(2.4, 0.62 * len(values) + 1.2) for values in (x, y))
@@ -103,12 +103,14 @@ def draw_map(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> Figure
     ]
     with style():
         figure, places = grid_of_panels(len(panels), wide=min(wide, 5.5), high=min(high, 5.0))
-        labels: list[tuple[Axes, Sequence[Label]]] = []
+        labels: list[tuple[Axes, Sequence[EndLabel]]] = []
         for axes, panel in zip(places, panels, strict=True):
             _draw_cells(axes, panel, numbers=bool(chart.quantity) and len(x) * len(y) <= SHOWN_NUMBERS)
             _name_axes(axes, panel, [[value_words(chart, key, v) for v in values] for key, values in
                                      ((str(chart.x), x), (chart.y[0], y))])  # fmt: skip
-            scaled = Panel(panel.title, panel.x, panel.y, predicted=_on_cells(study, chart, panel.predicted))
+            scaled = ChartPanel(
+                panel.title, panel.x, panel.y, predicted=_on_cells(study, chart, panel.predicted)
+            )
             labels.append((axes, draw_predicted(axes, scaled)))
         handles = [swatch(*COLOURS.get(name, OTHER), outcome_words(name)) for name in outcomes]
         figure.legend(handles=handles, loc="outside right upper")
@@ -124,7 +126,7 @@ def _quantity_words(study: StudyTable, chart: ChartSpec) -> str:
     return f"{words}; energy has grown where it is above {chart.factor:g}." if chart.factor else f"{words}."
 
 
-def _draw_cells(axes: Axes, panel: Panel, *, numbers: bool) -> None:
+def _draw_cells(axes: Axes, panel: ChartPanel, *, numbers: bool) -> None:
     for line in panel.lines:
         for p in line.points:
             colour, mark = COLOURS.get(p.outcome, OTHER)
@@ -139,7 +141,7 @@ def _draw_cells(axes: Axes, panel: Panel, *, numbers: bool) -> None:
                 axes.text(p.x, p.y - 0.22, f"{p.low:.2g}", ha="center", va="center", fontsize=6.5)
 
 
-def _name_axes(axes: Axes, panel: Panel, names: list[list[str]]) -> None:
+def _name_axes(axes: Axes, panel: ChartPanel, names: list[list[str]]) -> None:
     across, up = names
     axes.set_xticks(range(len(across)), across, rotation=90 if max(map(len, across)) > 5 else 0)
     axes.set_yticks(range(len(up)), up)
@@ -149,13 +151,13 @@ def _name_axes(axes: Axes, panel: Panel, names: list[list[str]]) -> None:
     axes.tick_params(length=0)
 
 
-def _on_cells(study: StudyTable, chart: ChartSpec, lines: list[Line]) -> list[Line]:
+def _on_cells(study: StudyTable, chart: ChartSpec, lines: list[ChartLine]) -> list[ChartLine]:
     """Predicted lines at places of cells: between two values by their logarithms where all are positive."""
     x, y = (_places(study.values(name)) for name in (str(chart.x), chart.y[0]))
     found = []
     for line in lines:
-        points = [Point(p.x if np.isinf(p.x) else _place(p.x, x), _place(p.y, y)) for p in line.shown]
-        found.append(Line(line.label, points))
+        points = [ChartPoint(p.x if np.isinf(p.x) else _place(p.x, x), _place(p.y, y)) for p in line.shown]
+        found.append(ChartLine(line.label, points))
     return found
 
 

@@ -19,7 +19,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from ancf_petsc.post.charts.points import Line, Panel, Point
+from ancf_petsc.post.charts.points import ChartLine, ChartPanel, ChartPoint
 from ancf_petsc.post.charts.words import outcome_words
 from ancf_petsc.post.panels import COLOURS, GREY
 from ancf_petsc.post.units import as_typed
@@ -37,14 +37,14 @@ COLUMN, ROW = 4.6, 3.9
 WRAPPED = 118
 
 
-class Look(NamedTuple):
+class LineLook(NamedTuple):
     """How a line is drawn."""
 
     colour: str
     mark: str
 
 
-class Label(NamedTuple):
+class EndLabel(NamedTuple):
     """Words beside the end of a line at (x, y)."""
 
     text: str
@@ -53,10 +53,10 @@ class Label(NamedTuple):
     colour: str
 
 
-def looks(labels: Iterable[str]) -> dict[str, Look]:
+def looks(labels: Iterable[str]) -> dict[str, LineLook]:
     """A colour and a mark for each line, the same in all panels."""
     pairs = zip(dict.fromkeys(labels), cycle(COLOURS), cycle(MARKS), strict=False)
-    return {label: Look(colour, mark) for label, colour, mark in pairs}
+    return {label: LineLook(colour, mark) for label, colour, mark in pairs}
 
 
 def grid_of_panels(count: int, *, wide: float = COLUMN, high: float = ROW) -> tuple[Figure, list[Axes]]:
@@ -71,7 +71,7 @@ def grid_of_panels(count: int, *, wide: float = COLUMN, high: float = ROW) -> tu
     return figure, list(axes.flat[:count])
 
 
-def draw_points(axes: Axes, line: Line, look: Look, *, joined: bool = True) -> None:
+def draw_points(axes: Axes, line: ChartLine, look: LineLook, *, joined: bool = True) -> None:
     """A line through its points; hollow where seconds do not count, error bars where they are known."""
     points = line.shown
     if not points:
@@ -87,7 +87,7 @@ def draw_points(axes: Axes, line: Line, look: Look, *, joined: bool = True) -> N
         )  # fmt: skip
 
 
-def draw_bars(axes: Axes, line: Line, look: Look) -> None:
+def draw_bars(axes: Axes, line: ChartLine, look: LineLook) -> None:
     """Error bars, within the axes as the points alone have set them."""
     limits = axes.get_ylim()
     for point in line.shown:
@@ -99,7 +99,7 @@ def draw_bars(axes: Axes, line: Line, look: Look) -> None:
     axes.set_ylim(limits)
 
 
-def draw_margin(axes: Axes, lines: Sequence[Line], look: dict[str, Look]) -> list[Point]:
+def draw_margin(axes: Axes, lines: Sequence[ChartLine], look: dict[str, LineLook]) -> list[ChartPoint]:
     """Runs without an answer above the axes, where they stand in x: the mark of their line, crossed out; those drawn."""
     found, taken = [], Counter[float]()
     for line in lines:
@@ -117,7 +117,7 @@ def draw_margin(axes: Axes, lines: Sequence[Line], look: dict[str, Look]) -> lis
     return found
 
 
-def failure_words(points: Sequence[Point], what: str = "Crossed out above") -> str:
+def failure_words(points: Sequence[ChartPoint], what: str = "Crossed out above") -> str:
     """What crosses stand for: how many runs ended in which way."""
     if not points:
         return ""
@@ -128,7 +128,7 @@ def failure_words(points: Sequence[Point], what: str = "Crossed out above") -> s
     return f"{what}: {len(points)} {'run' if len(points) == 1 else 'runs'} without an answer: {names}."
 
 
-def draw_predicted(axes: Axes, panel: Panel) -> list[Label]:
+def draw_predicted(axes: Axes, panel: ChartPanel) -> list[EndLabel]:
     """Predicted lines in grey, dashed; their labels for the right margin."""
     labels = []
     kinds = ((0, (5, 3)), (0, (1, 1.5)), (0, (7, 2, 1, 2)), (0, (3, 2, 1, 2, 1, 2)))
@@ -138,7 +138,7 @@ def draw_predicted(axes: Axes, panel: Panel) -> list[Label]:
             continue
         if len({p.y for p in points}) == 1 and points[0].x == -np.inf:
             axes.axhline(points[0].y, color=GREY, linestyle=kind, linewidth=1.2, zorder=2)
-            labels.append(Label(line.label, np.nan, points[0].y, GREY))
+            labels.append(EndLabel(line.label, np.nan, points[0].y, GREY))
         else:
             axes.plot(
                 [p.x for p in points],
@@ -148,23 +148,23 @@ def draw_predicted(axes: Axes, panel: Panel) -> list[Label]:
                 linewidth=1.4,
                 zorder=2,
             )
-            labels.append(Label(line.label, points[-1].x, points[-1].y, GREY))
+            labels.append(EndLabel(line.label, points[-1].x, points[-1].y, GREY))
     return labels
 
 
-def end_labels(lines: Sequence[Line], look: dict[str, Look]) -> list[Label]:
+def end_labels(lines: Sequence[ChartLine], look: dict[str, LineLook]) -> list[EndLabel]:
     """The words of lines at their last points."""
     return [
-        Label(" ".join(filter(None, (line.label, line.more))), end.x, end.y, look[line.label].colour)
+        EndLabel(" ".join(filter(None, (line.label, line.more))), end.x, end.y, look[line.label].colour)
         for line in lines
         if line.shown
         for end in line.shown[-1:]
     ]
 
 
-def write_labels(figure: Figure, labels: Sequence[tuple[Axes, Sequence[Label]]]) -> None:
+def write_labels(figure: Figure, labels: Sequence[tuple[Axes, Sequence[EndLabel]]]) -> None:
     """Words of lines to the right of the axes, each at the height of its line's end as far as there is room."""
-    made: list[tuple[Axes, list[tuple[Label, Annotation]]]] = []
+    made: list[tuple[Axes, list[tuple[EndLabel, Annotation]]]] = []
     for axes, some in labels:
         pairs = []
         for label in some:
@@ -183,7 +183,7 @@ def write_labels(figure: Figure, labels: Sequence[tuple[Axes, Sequence[Label]]])
         _spread(axes, pairs, figure.dpi)
 
 
-def _spread(axes: Axes, pairs: list[tuple[Label, Annotation]], dpi: float) -> None:
+def _spread(axes: Axes, pairs: list[tuple[EndLabel, Annotation]], dpi: float) -> None:
     """Move the words of one panel apart."""
     box = axes.get_window_extent()
     heights = []
