@@ -48,7 +48,8 @@ def map_panels(study: StudyTable, chart: ChartSpec) -> list[ChartPanel]:
     x, y = str(chart.x), chart.y[0]
     for value, rows in panel_rows(study, chart).items():
         title = value_words(chart, str(chart.panels), value) if chart.panels else ""
-        panel = ChartPanel(title, axis_words(study, chart, x), axis_words(study, chart, y))
+        words = (chart.x_label or axis_words(study, chart, x), chart.y_label or axis_words(study, chart, y))
+        panel = ChartPanel(title, *words)
         found: dict[str, list[ChartPoint]] = {}
         for row in rows:
             outcome = outcome_of(row, chart)
@@ -101,11 +102,12 @@ def draw_map(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -> F
         *(name for name in COLOURS if name in outcomes),
         *(name for name in outcomes if name not in COLOURS),
     ]
+    numbers = bool(chart.quantity) and len(x) * len(y) <= SHOWN_NUMBERS
     with style():
         figure, places = grid_of_panels(len(panels), wide=min(wide, 5.5), high=min(high, 5.0))
         labels: list[tuple[Axes, Sequence[EndLabel]]] = []
         for axes, panel in zip(places, panels, strict=True):
-            _draw_cells(axes, panel, numbers=bool(chart.quantity) and len(x) * len(y) <= SHOWN_NUMBERS)
+            _draw_cells(axes, panel, numbers=numbers)
             _name_axes(axes, panel, [[value_words(chart, key, v) for v in values] for key, values in
                                      ((str(chart.x), x), (chart.y[0], y))])  # fmt: skip
             scaled = ChartPanel(
@@ -114,16 +116,20 @@ def draw_map(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -> F
             labels.append((axes, draw_predicted(axes, scaled)))
         handles = [swatch(*COLOURS.get(name, OTHER), outcome_words(name)) for name in outcomes]
         figure.legend(handles=handles, loc="outside right upper")
-        finish_chart(figure, title_of(study, chart), (chart.note, _quantity_words(study, chart)))
+        finish_chart(
+            figure, title_of(study, chart), (chart.note, _quantity_words(study, chart, numbers=numbers))
+        )
         write_labels(figure, labels)
     return figure
 
 
-def _quantity_words(study: StudyTable, chart: ChartSpec) -> str:
+def _quantity_words(study: StudyTable, chart: ChartSpec, *, numbers: bool) -> str:
     if not chart.quantity:
         return ""
-    words = f"Numbers in cells: {axis_words(study, chart, chart.quantity)}"
-    return f"{words}; energy has grown where it is above {chart.factor:g}." if chart.factor else f"{words}."
+    name = axis_words(study, chart, chart.quantity)
+    shown = f"Numbers in cells: {name}." if numbers else ""
+    grown = f"Energy has grown where {name} is above {chart.factor:g}." if chart.factor else ""
+    return " ".join(filter(None, (shown, grown)))
 
 
 def _draw_cells(axes: Axes, panel: ChartPanel, *, numbers: bool) -> None:
