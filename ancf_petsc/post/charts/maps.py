@@ -34,7 +34,7 @@ COLOURS = {
     "material_limit": ("#0072B2", "p"),
     "inverted_element": ("#8c6d46", "<"),
     "step_too_long": ("#D55E00", ">"),
-    "diverged": ("#D55E00", "X"),
+    "diverged": ("#444444", "X"),
 }
 """Outcome -> colour of its cells and the mark in them. Others are grey crosses."""
 OTHER = ("#999999", "x")
@@ -144,7 +144,14 @@ def _draw_cells(axes: Axes, panel: ChartPanel, *, numbers: bool) -> None:
                 p.x, p.y + (0.17 if shown else 0), mark, color="#222222", markersize=5, markerfacecolor="none"
             )
             if shown:
-                axes.text(p.x, p.y - 0.22, f"{p.low:.2g}", ha="center", va="center", fontsize=6.5)
+                axes.text(p.x, p.y - 0.22, short_number(p.low), ha="center", va="center", fontsize=6.5)
+
+
+def short_number(value: float) -> str:
+    """In at most six characters: two digits, or the power of ten of what is very large or small."""
+    if value == 0 or 1e-3 <= abs(value) < 1e4:
+        return f"{value:.2g}" if abs(value) < 100 else f"{value:.0f}"
+    return f"{value:.0e}".replace("e+0", "e").replace("e-0", "e-").replace("e+", "e")
 
 
 def _name_axes(axes: Axes, panel: ChartPanel, names: list[list[str]]) -> None:

@@ -32,6 +32,8 @@ MARGIN = 1.035
 """Height of failed runs, in parts of the axes'."""
 MARGIN_ROW = 0.05
 """Distance of those that stand at one place."""
+TICK_GAP = 0.17
+"""Least distance of ticks of a short logarithmic axis, in parts of it."""
 COLUMN, ROW = 4.6, 3.9
 """Inches of a panel."""
 WRAPPED = 118
@@ -217,12 +219,12 @@ def plain_ticks(axes: Axes, values: Sequence[float]) -> None:
     known = sorted({value for value in values if value > 0})
     if axes.get_xscale() != "log" or not known or known[-1] >= 100 * known[0]:
         return
-    least = (known[-1] / known[0]) ** (1 / 7)
+    least = (known[-1] / known[0]) ** TICK_GAP
     shown = known[:1]
     for value in known[1:]:
         if value >= least * shown[-1]:
             shown.append(value)
-    axes.set_xticks(shown, [f"{value:.3g}" for value in shown])
+    axes.set_xticks(shown, [f"{value:,.0f}" if value >= 1000 else f"{value:.3g}" for value in shown])
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
