@@ -21,7 +21,7 @@ from ancf_petsc.post.charts.marks import (
     plain_ticks,
     write_labels,
 )
-from ancf_petsc.post.charts.points import NAN, ChartLine, ChartPanel, ChartPoint, grouped, line_keys, pareto
+from ancf_petsc.post.charts.points import NAN, ChartLine, ChartPanel, ChartPoint, grouped, pareto
 from ancf_petsc.post.charts.spec import ChartSpec
 from ancf_petsc.post.charts.study_table import StudyRow, StudyTable, same, select
 from ancf_petsc.post.charts.words import axis_words, title_of
@@ -118,15 +118,16 @@ def reference_words(study: StudyTable, chart: ChartSpec) -> str:
     reference = study.reference(str(chart.quantity))
     words = str(reference.get("words") or "")
     value, unit = reference.get("value"), study.quantities.get(str(chart.quantity), {}).get("unit") or ""
-    if isinstance(value, int | float):
+    if isinstance(value, int | float) and value:
         said = f"{value:.6g} {unit}".strip()
         words = f"{said} ({words})" if words else said
     return f"Errors are against {words}." if words else ""
 
 
 def is_relative(study: StudyTable, chart: ChartSpec) -> bool:
-    """Whether errors are parts of the reference; against 0 they are absolute."""
-    return study.reference(str(chart.quantity)).get("value") != 0
+    """Whether errors are parts of the reference; against the number 0 they are absolute."""
+    facts = study.quantities.get(str(chart.quantity), {})
+    return bool(facts.get("against")) or study.reference(str(chart.quantity)).get("value") != 0
 
 
 def _error_words(study: StudyTable, chart: ChartSpec) -> str:
@@ -158,12 +159,10 @@ def _abscissa(study: StudyTable) -> str:
 
 def order_words(study: StudyTable, chart: ChartSpec, rows: list[StudyRow], line: ChartLine) -> str:
     """The order that the study has fitted to the line, else the slope of its finest three errors."""
-    keys = line_keys(study, chart)
     for order in study.orders:
-        fits = order.get("quantity") == chart.quantity and order.get("line", {}).keys() <= set(keys)
-        if not (
-            fits and rows and all(same(rows[0].text(key), value) for key, value in order["line"].items())
-        ):
+        known = {key: value for key, value in order.get("line", {}).items() if value is not None}
+        fits = order.get("quantity") == chart.quantity and rows
+        if not (fits and all(same(row.text(key), value) for row in rows for key, value in known.items())):
             continue
         if order.get("verdict") == "asymptotic" and isinstance(order.get("order"), int | float):
             return f"order {order['order']:.1f}"
