@@ -68,6 +68,29 @@ def box(
     return Primitive(about, build, grid, faces, edges or {}, size, divisions, rims)
 
 
+def beam(about: str, width: float, *, layer: float = 1.0) -> Primitive:
+    """A beam 1 m long along x with a square section, clamped at x = 0.
+
+    layer: thickness of the middle layer of bricks along x, in parts of the others'.
+    """
+    high = (1.0, width, width)
+
+    def grid(divisions: Sequence[int]) -> Floats:
+        points = _box_grid(divisions, (0, 0, 0), high)
+        parts = np.ones(divisions[0])
+        parts[divisions[0] // 2] = layer
+        x = np.concatenate([[0.0], np.cumsum(parts)]) / parts.sum()
+        x[-1] = 1.0
+        points[..., 0] = x
+        return points
+
+    faces: Faces = {"clamp": (("x", 0.0),), "end": (("x", 1.0),)}
+    divisions, rims = (20, 2, 2), (("x", 0.0),)
+    return Primitive(
+        about, partial(_add_box, low=(0, 0, 0), high=high), grid, faces, {}, width / 2, divisions, rims
+    )
+
+
 INNER, OUTER, HEIGHT = 0.025, 0.095, 0.1
 GROOVE_DEPTH, GROOVE_MOUTH = 0.025, 0.02
 LOWER, UPPER = (HEIGHT - GROOVE_MOUTH) / 2, (HEIGHT + GROOVE_MOUTH) / 2
@@ -171,13 +194,12 @@ BODIES = {
         size=0.095,
         divisions=(13, 1, 1),
     ),
-    "cantilever": box(
-        "beam 1 x 0.1 x 0.1 m along x",
-        (0, 0, 0),
-        (1, 0.1, 0.1),
-        faces={"clamp": (("x", 0.0),), "end": (("x", 1.0),)},
-        size=0.05,
-        divisions=(20, 2, 2),
-        rims=(("x", 0.0),),
-    ),
+    "cantilever": beam("beam 1 x 0.1 x 0.1 m along x", 0.1),
+    **{f"slender_{ratio}": beam(f"the same 1 : {ratio}", 1.0 / ratio) for ratio in (30, 100, 300, 1000)},
+    **{
+        f"thin_layer_{ratio}": beam(
+            f"the cantilever, one layer of its bricks 1 : {ratio}", 0.1, layer=1.0 / ratio
+        )
+        for ratio in (10, 100, 1000, 10000)
+    },
 }
