@@ -198,7 +198,13 @@ class SectionSpec(Table):
     """[section], for plane elements and beams."""
 
     thickness: float | None = key("a number > 0", None, gt=0)
-    plane: Literal["stress", "strain"] | None = key("a kind of plane state", None)
+    plane: Literal["stress", "strain", "axisymmetric"] | None = key("a kind of plane state", None)
+    axis: Axis | None = key(
+        'an axis "x", "y" or "z" in the plane of the mesh; the axis of revolution, through the origin', None
+    )
+    angle: float | None = key(
+        "a number in (0, 360]; degrees of the ring that forces and energies are of", None, gt=0, le=360
+    )
     area: float | None = key("a number > 0", None, gt=0)
     inertia: float | None = key("a number > 0; the second moment of area", None, gt=0)
 
@@ -224,6 +230,11 @@ class CaseSpec(Table):
         'an option with its value, without the leading dash; such as ksp_type = "cg"', {}
     )
     section: SectionSpec | None = key("a table [section]", None)
+
+    @property
+    def is_axisymmetric(self) -> bool:
+        """Whether the body is one of revolution, of which the mesh is the section."""
+        return self.section is not None and self.section.plane == "axisymmetric"
 
     @model_validator(mode="before")
     @classmethod
