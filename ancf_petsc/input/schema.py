@@ -57,7 +57,9 @@ class MeshSpec(Table):
         "three whole numbers >= 1; bricks of `body` along x, y, z, such as [4, 4, 8]", None
     )
     hexahedra: bool = key("true to leave the bricks of `divisions` whole", False)
-    flat: Literal["quad", "line"] | None = key('"quad" or "line"; a section or an axis of `body`', None)
+    flat: Literal["triangle", "quad", "line"] | None = key(
+        'one of "triangle", "quad", "line"; a section or an axis of `body`', None
+    )
     element: str = key(
         'a code of the catalogue, in quotes; such as "3413"', pattern=r"^(\d{4}|\d-\d+-\d-\d)(\+\d+)?$"
     )

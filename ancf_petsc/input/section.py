@@ -13,7 +13,7 @@ Problems = Iterator[PydanticCustomError]
 
 
 def section(spec: CaseSpec) -> Problems:
-    """Solids have no section; plane elements need a plane state, and a thickness unless they are axisymmetric, beams area and inertia."""
+    """Solids have no section; plane elements need a plane state, and a thickness unless it is axisymmetric, beams their own."""
     yield from _keys(spec)
     given, condensing = spec.section, " or ".join(name for name, law in laws().items() if law.condenses)
     others = [material.law for material in spec.material if not laws()[material.law].condenses]

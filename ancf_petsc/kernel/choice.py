@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ancf_petsc.element.element import Element
 from ancf_petsc.kernel import point_beam, point_ring, point_solid, tet3413
 from ancf_petsc.kernel.interface import Cells, Floats, Kernels
-from ancf_petsc.kernel.revolution import RingCells, Revolution, ring_tables
+from ancf_petsc.kernel.revolution import Revolution, RingCells, ring_tables
 from ancf_petsc.kernel.tables import make_tables, nodes_with_slopes
 from ancf_petsc.material.models import Law
 
@@ -30,7 +30,8 @@ class KernelSet(NamedTuple):
 
 
 def _any_cells(element: Element, cells: NDArray[np.int32], reference: Floats, **more) -> Cells:
-    return make_tables(element, cells, **_places(element, cells, reference), **more)
+    corners, slopes = _places(element, cells, reference)
+    return make_tables(element, cells, corners, directions=slopes, **more)
 
 
 def _rings(
@@ -44,16 +45,17 @@ def _rings(
     numbers: NDArray | None = None,
     **_: object,
 ) -> RingCells:
-    more = {"axes": axes, "quadrature": quadrature, "numbers": numbers}
-    return ring_tables(element, cells, revolution=revolution, **_places(element, cells, reference), **more)
+    corners, slopes = _places(element, cells, reference)
+    more: dict[str, Any] = {"directions": slopes, "quadrature": quadrature, "numbers": numbers}
+    return ring_tables(element, cells, corners, revolution=revolution, axes=axes, **more)
 
 
-def _places(element: Element, cells: NDArray[np.int32], reference: Floats) -> dict[str, Floats]:
+def _places(element: Element, cells: NDArray[np.int32], reference: Floats) -> tuple[Floats, Floats]:
     """Undeformed corners (e, c, 3) and slopes (e, s, d, 3)."""
     corners = reference[cells[:, np.flatnonzero(element.slot == 0)[: len(element.cell.corners)]]]
     s, d = nodes_with_slopes(element), element.cell.dimension
     slopes = reference[cells[:, np.flatnonzero(element.slot > 0)]].reshape(len(cells), s, d, 3)
-    return {"corners": corners, "directions": slopes}
+    return corners, slopes
 
 
 def _tetrahedra(

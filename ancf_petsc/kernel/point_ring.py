@@ -1,7 +1,7 @@
 """What happens at a point of a body of revolution: a plane solid with a stretch along the hoop, r / R.
 
-With n the direction of the hoop and e that of the radius, the third column of the functions' table is N_a and the third row of dxi/dX is
-n / R. Then H = sum_a r_a G_a, as in any solid, holds the hoop stretch in e.Hn, and
+With n the direction of the hoop and e that of the radius, the third column of the functions' table is N_a and the third row of
+dxi/dX is n / R. Then H = sum_a r_a G_a, as in any solid, holds the hoop stretch in e.Hn, and
 
     F = H (I - n nT) + (e.Hn) n nT
 
@@ -92,7 +92,15 @@ def place(frame, cells, q):
     m, n, s = frame.inverse, unit(cells.normal), 1.0 / cells.radii[frame.e, q]
     inverse = (m[0], m[1], m[2], m[3], m[4], m[5], s * n[0], s * n[1], s * n[2])
     ring = RingFrame(
-        frame.e, frame.nodes, frame.slot, frame.J, inverse, frame.base, frame.volume, cells.radial, cells.normal
+        frame.e,
+        frame.nodes,
+        frame.slot,
+        frame.J,
+        inverse,
+        frame.base,
+        frame.volume,
+        cells.radial,
+        cells.normal,
     )
     weight = cells.weights[frame.e, q]
     return At(ring, cells.gradients[q], weight / frame.volume, weight)
@@ -107,9 +115,7 @@ def deformation(local, at):
     H, n = gradient(local, at), unit(at.frame.normal)
     hoop = apply(H, n)
     stretch = inner(unit(at.frame.radial), hoop)
-    return add(
-        H, outer((stretch * n[0] - hoop[0], stretch * n[1] - hoop[1], stretch * n[2] - hoop[2]), n)
-    )
+    return add(H, outer((stretch * n[0] - hoop[0], stretch * n[1] - hoop[1], stretch * n[2] - hoop[2]), n))
 
 
 @inlined
@@ -124,7 +130,7 @@ def add_stress(local, at, P):
 
 @inlined
 def fold(at, A):
-    """From dP/dF to derivatives with respect to H, in A (3 J, 3 L, 9 ik): hoop (n, n) becomes (e, n), other (i, n) vanish."""
+    """From dP/dF to derivatives with respect to H, in A (3 J, 3 L, 9 ik): (n, n) becomes (e, n), other (i, n) vanish."""
     e, n = at.frame.radial, at.frame.normal
     for L in range(3):
         for k in range(3):

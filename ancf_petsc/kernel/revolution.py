@@ -1,7 +1,7 @@
 """Bodies of revolution: a mesh of their section, whose cells are rings about an axis through the file's origin.
 
-Cells are affine, so the undeformed radius is R = c_0 + sum_k c_k xi_k in each of them, and what an angle of the ring has of a cell is
-angle det(J) R per area of the reference cell.
+Cells are affine, so the undeformed radius is R = c_0 + sum_k c_k xi_k in each of them, and what an angle of the ring has of a cell
+is angle det(J) R per area of the reference cell.
 """
 
 from __future__ import annotations

@@ -45,7 +45,9 @@ def compiled_sets() -> Iterator[tuple[Element, list[Law], dict[str, bool]]]:
         for element in reversed(ELEMENTS.values())
         for axisymmetric in ((False, True) if element.is_plane else (False,))
     }
-    for (element, axisymmetric), mean, moving in product(representatives.values(), (False, True), (False, True)):
+    for (element, axisymmetric), mean, moving in product(
+        representatives.values(), (False, True), (False, True)
+    ):
         flags = {"mean": mean, "moving": moving, "axisymmetric": axisymmetric}
         laws = [law for law in LAWS.values() if is_compiled(element, [law], **flags)]
         if laws:

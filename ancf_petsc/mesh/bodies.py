@@ -27,7 +27,7 @@ class Primitive:
     faces: group name -> planes its faces lie on, as (axis, coordinate).
     edges: group name -> lines it is made of, each as two planes.
     build: adds the solid to Gmsh's OpenCASCADE model.
-    grid: structured points (nz + 1, ny + 1, nx + 1, 3) from divisions (nx, ny, nz); None where there are none.
+    grid: structured points (nz + 1, ny + 1, nx + 1, 3) from divisions (nx, ny, nz).
     size, divisions: what is made where nothing is asked for; size is the length of edges.
     rims: planes of bonded faces and of roots, whose curves off the planes of symmetry meshes can be graded to.
     section: adds the section in the plane x-z to the model, half way along y or that which is revolved about z. revolved: it is.
@@ -35,7 +35,7 @@ class Primitive:
 
     about: str
     build: Callable[[Any], None]
-    grid: Callable[[Sequence[int]], Floats] | None
+    grid: Callable[[Sequence[int]], Floats]
     faces: Faces
     edges: Edges
     size: float
@@ -118,8 +118,8 @@ def _revolve(gmsh: Any, section: Callable[[Any], int]) -> None:
     gmsh.model.occ.revolve([(2, section(gmsh))], 0, 0, 0, 0, 0, 1, np.pi / 2)
 
 
-def _pvc_grid(divisions: Sequence[int]) -> Floats:
-    """Divisions across the wall, around the quarter, over the height; the groove's corners are nodes."""
+def _pvc_grid(divisions: Sequence[int], radius: float = 0.0) -> Floats:
+    """Divisions across the wall, around the quarter, over the height; the groove's corners are nodes. radius: of its root."""
     across, around, over = divisions
     if over < 4 or over % 2:
         raise CaseError("divisions over the height", got=over, expected="an even number, at least 4")
@@ -128,10 +128,15 @@ def _pvc_grid(divisions: Sequence[int]) -> Floats:
     half = np.concatenate([lower, np.linspace(LOWER, HEIGHT / 2, flank + 1)[1:]])
     z = np.concatenate([half, HEIGHT - half[-2::-1]])
     depth = GROOVE_DEPTH * np.clip(1 - np.abs(z - HEIGHT / 2) / (GROOVE_MOUTH / 2), 0, None)
-    radius = INNER + (OUTER - depth - INNER)[:, None, None] * np.linspace(0, 1, across + 1)
+    if radius:
+        root, centre = _root()
+        inside = np.abs(z - centre[1]) < root[-1, 1] - centre[1]
+        arc = np.sqrt(np.where(inside, radius**2 - (z - centre[1]) ** 2, 0.0))
+        depth = np.where(inside, OUTER - centre[0] + arc, depth)
+    distance = INNER + (OUTER - depth - INNER)[:, None, None] * np.linspace(0, 1, across + 1)
     angle = np.linspace(0, np.pi / 2, around + 1)[:, None]
     cosine = np.where(angle == angle[-1], 0, np.cos(angle))
-    x, y, z = np.broadcast_arrays(radius * cosine, radius * np.sin(angle), z[:, None, None])
+    x, y, z = np.broadcast_arrays(distance * cosine, distance * np.sin(angle), z[:, None, None])
     return np.stack([x, y, z], axis=-1)
 
 
@@ -164,7 +169,7 @@ BODIES = {
     "pvc_block_rounded": Primitive(
         "the same with the root of the groove rounded by 4 mm, which ends stresses without limit there",
         partial(_revolve, section=_add_rounded),
-        None,
+        partial(_pvc_grid, radius=ROOT_RADIUS),
         QUARTER,
         {},
         0.01,

@@ -48,8 +48,8 @@ def make_mesh(
 ) -> Path:
     """Writes a mesh of one of BODIES as a Gmsh file and returns its path.
 
-    flat: the section of a box half way along y, that of a body of revolution in the plane x-z, with the groups that cut it: "triangle",
-    or of a box "quad"; "line" for a box's axis along x.
+    flat: the section of a box half way along y, that of a body of revolution in the plane x-z, with the groups that cut it:
+    "triangle", or of a box "quad"; "line" for a box's axis along x.
     size: length of edges of an unstructured mesh, rim: at rims of bonded faces and roots, where stresses are
     singular; edges grow with the distance from them. divisions: bricks (nx, ny, nz) of a structured one, for
     pvc_block across the wall, around, over the height. order 2 adds mid-nodes on straight edges.
@@ -74,7 +74,6 @@ def make_mesh(
     if divisions is None and not hexahedra:
         points, cells = _unstructured(body, body.size if size is None else size, rim)
     else:
-        assert body.grid
         points, cells = bricks(body.grid(body.divisions if divisions is None else divisions))
         if not hexahedra:
             cells = cells[:, np.array(KUHN)].reshape(-1, 4)
@@ -113,7 +112,7 @@ def _checked_request(
 
 
 def _check_grid(name: str, flat: str, *, structured: bool) -> None:
-    """Which meshes in rows there are: of boxes all, of pvc_block bricks, of a rounded body none."""
+    """A section that is revolved is no parallelogram and is meshed by Gmsh alone."""
     body = BODIES[name]
     if flat in ("quad", "line") and body.revolved:
         cure = "--flat triangle, or no --flat for the quarter"
@@ -121,8 +120,6 @@ def _check_grid(name: str, flat: str, *, structured: bool) -> None:
     if flat and structured and body.revolved:
         cure = "give --size, and --rim for finer edges at roots and bonded rims"
         raise CaseError(f"the section of {name} is meshed by Gmsh", key="--divisions", got="given", cure=cure)
-    if structured and body.grid is None:
-        raise CaseError(f"{name} has no bricks in rows", key="--divisions", got="given", cure="give --size")
 
 
 def _check_rim(name: str, rim: float, size: float | None, *, structured: bool) -> None:
@@ -163,7 +160,9 @@ def _unstructured(
     order = np.argsort(numbers)
     cells = np.searchsorted(numbers[order], nodes)
     used, cells = np.unique(cells, return_inverse=True)
-    return coordinates.reshape(-1, 3)[order[used]], cells.reshape(-1, dimension + 1)
+    cells = cells.reshape(-1, dimension + 1)
+    # Faces in x-z have their normal along y, where the plane of z and x is seen from behind.
+    return coordinates.reshape(-1, 3)[order[used]], cells if dimension == 3 else cells[:, [0, 2, 1]]
 
 
 def grade(gmsh: Any, places: Sequence[int], size: float, rim: float, kind: str = "Curves") -> None:
@@ -218,9 +217,8 @@ def bricks(grid: Floats) -> tuple[Floats, Integers]:
 
 
 def _flat(body: Primitive, divisions: Sequence[int], kind: str) -> tuple[Floats, Integers]:
-    """Points and cells of the section half way along y (in z-x) or of the axis along x (lines); a triangle is half a quadrilateral."""
+    """Points and cells of the section half way along y (in z-x) or of the axis along x; triangles are halves of quadrilaterals."""
     d = KINDS[kind].dimension
-    assert body.grid
     nx, _, nz = divisions
     grid = body.grid((nx, 2, 2 * nz if d == 2 else 2))[:, 1]
     grid = grid[::2] if d == 2 else grid[1:2]

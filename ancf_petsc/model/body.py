@@ -69,7 +69,7 @@ class Body:
     size: float
     cell_numbers: NDArray[np.int64]
     lumped: bool
-    revolution: Revolution | None = None
+    revolution: Revolution | None
 
     @property
     def owned(self) -> int:

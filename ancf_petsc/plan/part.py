@@ -26,7 +26,7 @@ class Part:
 
     Today one part, on the root rank, is all of the mesh. Entries speak of a part nevertheless, and of sums over all parts
     (`total`), so that none of them stands in the way of reading and planning on every rank. normal: the axis that a plane body
-    does not move along, None for a body in space; revolution: how the mesh is a section of a body, None for others. ramps: makes those of the case.
+    does not move along, None for a body in space. revolution: of a body whose section the mesh is. ramps: makes those of the case.
     """
 
     def __init__(self, case: Case, mesh: Mesh, element: Element) -> None:

@@ -38,7 +38,8 @@ class Plan:
     """Tables over the nodal vectors (v) and cells (e) of a part of the mesh, in file order.
 
     space: nodes, nodal vectors and cells. material (e,): index into the case's materials. loads: number of a load -> (v,) what it
-    entered. revolution: of a body of revolution. members: group -> (v,) bool, positions of its nodes. means: name -> (v,) weights of a mean position.
+    entered. members: group -> (v,) bool, positions of its nodes. means: name -> (v,) weights of a mean position. revolution: of a
+    body whose section the mesh is.
     """
 
     mesh: Mesh

@@ -27,7 +27,7 @@ class Space:
     cells (e, k): nodes of the cells. first (n + 1,): first nodal vector of each node, its position; its slopes follow.
     axes (3, d): directions the body lies along. frames (n, 3, 3): columns are the directions of the slopes of each node.
     lengths (n,): what a slope is multiplied with to be a nodal vector: the size of the cells around the node, so that
-    all nodal vectors are lengths and all that works on them forces. revolution: how the mesh is a section of a body, None for others.
+    all nodal vectors are lengths and all that works on them forces. revolution: of a body whose section the mesh is.
     """
 
     def __init__(self, mesh: Mesh, element: Element) -> None:

@@ -19,9 +19,7 @@ def refuse_free_motions(part: Part, table: SupportTable) -> None:
     space = part.space
     pieces, label = connected_pieces(space.cells, len(space.nodes))
     driven, nodes, slopes = table.drive >= 0, space.node_of(), space.slots() > 0
-    free = free_motions(
-        space.reference(), driven, label[nodes], pieces, slopes=slopes, lacking=part.lacking
-    )
+    free = free_motions(space.reference(), driven, label[nodes], pieces, slopes=slopes, lacking=part.lacking)
     if not free:
         _refuse_joints(part, driven, pieces)
         return
