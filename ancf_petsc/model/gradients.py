@@ -12,10 +12,30 @@ Integers = NDArray[np.int64]
 
 
 def deformation_gradients(body: Body, positions: Floats, point: Floats, cells: Integers) -> Floats:
-    """F (m, 3, 3) of some cells (m,) at one point (k,), from positions (v, 3); 1 along the normal of a plane body."""
+    """F (m, 3, 3) of some cells (m,) at one point (k,), from positions (v, 3). Across a plane body the stretch is 1, around the
+    axis of a body of revolution that of the radius.
+    """
     inverse = _inverse(body, point, cells)
     edges = tangents(body, body.reference, point, np.eye(len(point)), cells)
-    return gradients(body, positions, point, cells) + np.eye(3) - np.einsum("eki,ekj->eij", edges, inverse)
+    across = np.eye(3) - np.einsum("eki,ekj->eij", edges, inverse)
+    return (
+        gradients(body, positions, point, cells)
+        + _around(body, positions, point, cells)[:, None, None] * across
+    )
+
+
+def _around(body: Body, positions: Floats, point: Floats, cells: Integers) -> Floats:
+    """Stretch (m,) of the radius of a body of revolution; 1 for other bodies and on the axis."""
+    if body.revolution is None:
+        return np.ones(len(cells))
+    values, radial = body.element.values(np.asarray(point)[None])[0], body.revolution.radial
+    shares, origin = body.mapped(values, cells), body.origin[radial]
+    before, after = (
+        origin + np.einsum("ea,ea->e", shares, field[body.cells[cells], radial])
+        for field in (body.reference, positions)
+    )
+    on_axis = np.abs(before) <= 1e-9 * body.size
+    return np.where(on_axis, 1.0, after / np.where(on_axis, 1.0, before))
 
 
 def gradients(body: Body, field: Floats, point: Floats, cells: Integers) -> Floats:

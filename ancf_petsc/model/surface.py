@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ancf_petsc.mesh.faces import sharing
@@ -65,8 +64,8 @@ def surface_of(assembly: Assembly) -> Surface:
 def is_planar(assembly: Assembly) -> bool:
     """Whether no node moves along one of the axes. Collective."""
     model = assembly.model
-    held = (model.drive[: model.owned] >= 0).all(axis=0)
-    return bool(combined(assembly.comm, held.astype(np.int64), MPI.MIN).any())
+    moving = (model.drive[: model.owned] < 0).sum(axis=0)
+    return bool((combined(assembly.comm, moving) == 0).any())
 
 
 def _normals(points: Floats, cells: Integers, sides: Integers) -> Floats:

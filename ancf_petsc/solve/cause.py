@@ -52,7 +52,7 @@ class Cause:
     def facts(self) -> dict[str, Any]:
         """For the summary."""
         if self.element < 0:
-            return {}
+            return dict(self.more)
         found = {
             "critical_stretch": self.critical,
             "law": self.law,
@@ -82,15 +82,17 @@ class Cause:
 
 
 def cause_of(assembly: Assembly, x: PETSc.Vec, mode: NDArray | None) -> Cause:
-    """Of a state x that loses its stability in a mode (n, 3); None takes all of the body for its core. Collective."""
+    """Of a state x that loses its stability in a mode (n, 3). None: of one that is stable as far as is known, so that only its
+    material can be to blame, anywhere. Collective.
+    """
     if assembly.model.element.is_beam:
         return Cause("lost_definiteness")
     body = _Body(assembly, x)
     core = body.core(mode)
-    for found in (body.beyond_law(core), body.folded(core)):
-        if found is not None:
-            return found
-    return Cause("lost_definiteness")
+    found = body.beyond_law(core)
+    if found is None and mode is not None:
+        found = body.folded(core)
+    return found or Cause("lost_definiteness")
 
 
 def flattened(assembly: Assembly, x: PETSc.Vec, least: float) -> Cause | None:
