@@ -1,6 +1,6 @@
-"""A shallow arch under a force carried past its limit point by damped motion: jumps_on_ranks.py CASE.json, on three ranks.
+"""Damped motion of a body from its undeformed state to rest under 0.6 of its loads: settling_on_ranks.py CASE.json, on three ranks.
 
-The first rank alone, the two others together, then all three: the jump, the energy after it, and the last displacement.
+The first rank alone, the two others together, then all three: steps, and energy and mean displacement at rest.
 """
 
 from __future__ import annotations
@@ -17,22 +17,21 @@ from ancf_petsc.analysis.build import build
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.measures import mean_position
 from ancf_petsc.plan.curve import STROKE
-from ancf_petsc.solve.load_path import LoadPath
-from ancf_petsc.solve.marks import Marks
+from ancf_petsc.solve.critical import Watch
 from ancf_petsc.solve.newton import Newton
+from ancf_petsc.solve.settle import settle
 
 
 def follow(data: dict[str, Any], comm: MPI.Comm) -> dict[str, Any]:
     assembly = Assembly(build(case_from_dict(data, Path(".")), comm).model)
-    newton, jumps = Newton(assembly, 1e-10), []
-    path = LoadPath(
-        newton,
-        Marks.of([0.6], ()),
-        1e-2,
-        on_jump=lambda jump, before, x: jumps.append([jump.before, jump.s, assembly.strain_energy(x)]),
-    )
-    path.run()
-    found = {"jumps": jumps, "at": mean_position(assembly, path.x, STROKE)[1].tolist()}
+    newton = Newton(assembly, 1e-10)
+    watch, x = Watch(newton), assembly.reference_vector()
+    newton.tangent_at(x)
+    watch.begin(0.0)
+    rest = settle(newton, watch, 0.6, x)
+    energy, place = assembly.strain_energy(x), mean_position(assembly, x, STROKE)[1]
+    found = {"steps": rest and rest.steps, "energy": energy, "at": place.tolist()}
+    watch.destroy()
     newton.destroy()
     return found
 
