@@ -24,7 +24,7 @@ FACING = 0.5
 
 
 @dataclass(frozen=True)
-class Surface:
+class BodySurface:
     """Boundary faces (f,) of this rank: cell (f,), facet (f,) of the reference cell, corners (f, c) as local nodal vectors.
 
     free (f,): whether nothing holds it. pairs (p, 2): faces that share an edge, in the plane a corner. singular (v,): nodal
@@ -39,7 +39,7 @@ class Surface:
     singular: NDArray[np.bool_]
 
 
-def surface_of(assembly: Assembly) -> Surface:
+def surface_of(assembly: Assembly) -> BodySurface:
     """Of a body of solids or plane elements. Collective."""
     model = assembly.model
     facets = np.array(model.element.cell.facets)
@@ -58,7 +58,7 @@ def surface_of(assembly: Assembly) -> Surface:
     on_edge = edges[singular].ravel()
     marks[on_edge[on_edge < model.owned], 0] = 1.0
     everywhere = assembly.with_ghosts(marks, np.zeros_like(model.reference))[:, 0] > 0.0
-    return Surface(cell, facet, sides, free, pairs, everywhere)
+    return BodySurface(cell, facet, sides, free, pairs, everywhere)
 
 
 def is_planar(assembly: Assembly) -> bool:

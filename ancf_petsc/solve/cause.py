@@ -18,7 +18,7 @@ from ancf_petsc.material.limits import critical_surface_stretch, ellipticity, un
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.body import Region
 from ancf_petsc.model.gradients import deformation_gradients, gradients, tangents
-from ancf_petsc.model.surface import Surface, is_planar, surface_of
+from ancf_petsc.model.surface import BodySurface, is_planar, surface_of
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.weakest import stretches
 
@@ -119,7 +119,7 @@ class _Body:
         self.stretch, _ = stretches(assembly, x)
         self.now = assembly.local(x).copy()
         self.strain = assembly.fields(x)[0].reshape(-1, 3, 3)
-        self.surface: Surface = surface_of(assembly)
+        self.surface: BodySurface = surface_of(assembly)
         self.at_edge = self.surface.singular[self.model.position_cells()].any(axis=1)
 
     def core(self, mode: NDArray | None) -> NDArray[np.bool_]:
