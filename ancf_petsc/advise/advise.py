@@ -128,8 +128,8 @@ def _announcement(work: _Search) -> str:
     names = ", ".join(dict.fromkeys(line.code for line in work.lines))
     kinds = ", ".join(dict.fromkeys(line.family.name for line in work.lines))
     return (
-        f"elements {names}; meshes {kinds}; about {count} runs to begin with, some {seconds:.0f} s, then finer ones where they pay; "
-        f"at most {work.lab.budget:.0f} s"
+        f"elements {names}; meshes {kinds}; about {count} runs to begin with, some {seconds:.0f} s, "
+        f"then finer ones where they pay; at most {work.lab.budget:.0f} s"
     )
 
 

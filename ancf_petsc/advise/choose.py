@@ -64,19 +64,19 @@ def best_guess(lines: Sequence[Discretisation], lab: Lab) -> BestGuess | None:
 
 
 def _of_finest(lines: Sequence[Discretisation]) -> BestGuess | None:
-    """The finest trial of the element of the highest order, as uncertain as its last step is large."""
-    long = [line for line in lines if len(line.trials) >= 2]
+    """The finest trial of the highest order whose last step was the smallest, as uncertain as twice that step."""
+    long = [line for line in lines if len(line.trials) >= 2 and line.values[-1] != 0.0]
     if not long:
         return None
-    line = max(
-        long, key=lambda line: (line.trials[line.levels[-1]].facts.order, len(line.trials), line.levels[-1])
-    )
-    last, before = line.values[-1], line.values[-2]
-    if last == 0.0:
-        return None
-    return BestGuess(
-        last, 2.0 * abs(before / last - 1), False, f"no limit can be claimed; the finest of {line.name}"
-    )
+    highest = max(line.order for line in long)
+    line = min((line for line in long if line.order == highest), key=_last_step)
+    words = f"no limit can be claimed from so few levels; the finest of {line.name}"
+    return BestGuess(line.values[-1], 2.0 * _last_step(line), False, words)
+
+
+def _last_step(line: Discretisation) -> float:
+    """Relative change of the value from the level before the finest."""
+    return abs(line.values[-2] / line.values[-1] - 1.0)
 
 
 def allowed(guess: BestGuess, target: float) -> float:

@@ -60,8 +60,13 @@ class Trial:
         return "" if self.row.done else self.row.outcome
 
     def _seconds(self, part: str) -> float:
-        summary = self.row.end.summary if self.row.end else {}
-        return float((summary.get("seconds") or {}).get(part, 0.0))
+        """Of the clock; where others had the machine's cores too, as much less as the processor worked less for the run."""
+        summary, record = self.row.end.summary if self.row.end else {}, self.row.record
+        found = float((summary.get("seconds") or {}).get(part, 0.0))
+        wall, processor = record.get("wall"), record.get("processor")
+        if record.get("alone") or not wall or processor is None:
+            return found
+        return found * min(1.0, processor / wall)
 
 
 class Lab:

@@ -69,6 +69,11 @@ class Discretisation:
         return [self.trials[level].value or 0.0 for level in self.levels]
 
     @property
+    def order(self) -> int:
+        """The degree up to which the element's polynomials are complete."""
+        return self.trials[self.levels[-1]].facts.order
+
+    @property
     def sizes(self) -> list[float]:
         """Mean sizes of elements, by level."""
         return [self.trials[level].facts.h for level in self.levels]

@@ -11,13 +11,11 @@ from ancf_petsc.advise.line import Discretisation
 
 SHARE = 0.25
 """Of the budget that is left: what one run may be expected to take."""
-FIRST = (0.0, 1.0, 2.0)
+FIRST = (0.0, 1.0)
 """Levels of every discretisation to begin with."""
 LARGEST_FIRST = 25_000
-"""Degrees of freedom that these may have; 0 and 1 are needed whatever they have, if the budget allows."""
+"""Degrees of freedom that these may have; the coarsest level is run whatever it has."""
 ROUNDS = 40
-FINER = 1.35
-"""Ratio of sizes by which the guess's ladder goes beyond the choice."""
 
 
 @dataclass
@@ -47,7 +45,7 @@ def _worth(line: Discretisation, level: float, lab: Lab) -> bool:
         return False
     if line.trials and line.seconds(level) > SHARE * lab.left:
         return False
-    return run.facts.dof <= LARGEST_FIRST or level < 2.0 and run.facts.dof <= 3 * LARGEST_FIRST
+    return run.facts.dof <= LARGEST_FIRST or level == 0.0
 
 
 def search(lines: Sequence[Discretisation], lab: Lab, target: float) -> Found:
@@ -63,9 +61,9 @@ def search(lines: Sequence[Discretisation], lab: Lab, target: float) -> Found:
         if wanted is None:
             return Found(guess, choices, complete=bool(choices))
         line, level = wanted
-        if line.make(lab, level) is None or lab.left <= 0:
-            if lab.left <= 0:
-                break
+        line.make(lab, level)
+        if lab.left <= 0:
+            break
     guess = best_guess(lines, lab)
     return Found(guess, ranked(lines, guess, target) if guess else [], complete=False)
 
