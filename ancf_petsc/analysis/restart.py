@@ -152,8 +152,8 @@ def _refusal(place: Path, what: str, changed: list[tuple[str, Any, Any]], hint: 
         f"the case is not the one of {what}",
         file=place,
         key=key,
-        got="nothing" if now is None else now,
-        expected="nothing" if before is None else repr(before),
+        got=_shown(now),
+        expected=str(_shown(before)),
         cure=(f"changed too: {others}; " if others else "")
         + f"give case, --set and options as at the start{hint}, or run without --restart",
     )
@@ -179,13 +179,30 @@ def _table(value: Any) -> dict[str, Any] | None:
         return {}
     if isinstance(value, dict):
         return value
+    if isinstance(value, list) and len(value) == 1 and isinstance(value[0], dict) and not _name(value[0]):
+        return value[0]
     if isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
-        names = [str(row.get("name") or row.get("group") or number) for number, row in enumerate(value)]
+        names = [_name(row) or str(number) for number, row in enumerate(value)]
         return {
             name if names.count(name) == 1 else str(k): row
             for k, (name, row) in enumerate(zip(names, value, strict=True))
         }
     return None
+
+
+def _name(row: dict[str, Any]) -> str:
+    return str(row.get("name") or row.get("group") or "")
+
+
+def _shown(value: Any) -> Any:
+    """As a case has it: values are compared with numbers as texts."""
+    if value is None:
+        return "nothing"
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        return value
+    return int(number) if number == int(number) and abs(number) < 1e6 else number
 
 
 # --- an extension

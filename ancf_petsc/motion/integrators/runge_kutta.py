@@ -49,7 +49,7 @@ class RungeKutta5dp(FirstOrder):
         if self._leaping is not None:
             return self._leap(goal, self._leaping)
         step = super().advance(goal)
-        self._steps += 1
+        self._first, self._steps = None, self._steps + 1
         return step
 
     def destroy(self) -> None:
@@ -96,8 +96,8 @@ class RungeKutta5dp(FirstOrder):
         return EXPLICIT[self.table].reuses_last and self._leaping is None
 
     def _rates(self, ts: PETSc.TS, t: float, y: PETSc.Vec, f: PETSc.Vec) -> None:
-        if self._first is not None:
-            f.array[:], self._first = self._first, None
+        if self._first is not None and t == self.time:  # of all attempts at the first step
+            f.array[:] = self._first
         else:
             self._compute_rates(t, y, f)
         if self._carries:
