@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +18,9 @@ from ancf_petsc.input.load import Case
 from ancf_petsc.results.mark import MARK
 
 TABLES = ("curve.csv", "probes.csv", "results.xdmf")
+
+
+FACTS = ("status", "end", "cuts", "step_control", "critical_points", "doubts", "iterations", "steps", "final")
 
 
 @contextmanager
@@ -65,12 +69,14 @@ def fields(folder: Path) -> dict[str, np.ndarray]:
 
 
 def differences(one: Path, other: Path) -> list[str]:
-    """Names of the files and fields in which two runs are not the same, bit by bit."""
+    """Names of the files, fields and facts of the summary in which two runs are not the same, bit by bit."""
     wrong = [
         name
         for name in TABLES
         if (one / name).exists() and (one / name).read_bytes() != (other / name).read_bytes()
     ]
+    said = [json.loads((folder / "summary.json").read_text()) for folder in (one, other)]
+    wrong += [name for name in FACTS if said[0].get(name) != said[1].get(name)]
     first, second = fields(one), fields(other)
     if first.keys() != second.keys():
         return [*wrong, "names of fields"]

@@ -81,6 +81,7 @@ class MotionRun:
             "work_is_due": self._work_is_due,
             "kinetic": self._kinetic,
             "start_energy": self._start_energy,
+            "control": self.control.state(),
             "integrator": self.integrator.state(),
         }
 
@@ -91,6 +92,7 @@ class MotionRun:
         self.work.restore(state["work"])
         self._work_is_due, self._kinetic = state["work_is_due"], state["kinetic"]
         self._start_energy = state["start_energy"]
+        self.control.restore(state["control"])
         self.integrator.restore(state["integrator"])
         self._from = self.integrator.time
 

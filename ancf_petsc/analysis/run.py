@@ -171,7 +171,8 @@ def _solve(
     try:
         with stop.watched(), clock.part("solve"):
             run.go()
-            saving.at_end(run)
+            if case.spec.dynamics is not None:
+                saving.at_end(run)
     except (
         AncfError
     ) as error:  # of all ranks; any other error is of this one alone, and summing up would wait

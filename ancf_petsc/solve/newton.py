@@ -138,6 +138,7 @@ class Newton:
             "term": self._term,
             "largest_diagonal": self.matrix.largest_diagonal,
             "linear": self.linear.state(),
+            "control": self.control.state(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -150,6 +151,7 @@ class Newton:
 
         self.linear.restore(state["linear"], make)
         x.destroy()
+        self.control.restore(state["control"])
         self._forcing.curvature, self._term = state["curvature"], state["term"]
         self.matrix.largest_diagonal = state["largest_diagonal"]
 
