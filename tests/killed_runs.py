@@ -47,7 +47,12 @@ def killed_alone(case: Case, folder: Path, after: float) -> bool:
 
 
 def killed_on_ranks(
-    case_file: Path, folder: Path, ranks: int, after: float, dice: random.Random, environment: Mapping[str, str]
+    case_file: Path,
+    folder: Path,
+    ranks: int,
+    after: float,
+    dice: random.Random,
+    environment: Mapping[str, str],
 ) -> bool:
     """Kill one rank, or all, of a run under mpiexec some seconds after its folder was marked; False where it was quicker."""
     words = ["run", str(case_file), "--restart", "--out", str(folder), "--quiet"]
