@@ -16,10 +16,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ancf_petsc.errors import CaseError, cannot_write, error_number
+from ancf_petsc.results.checkpoint_file import NAMES, sweep
 from ancf_petsc.results.mark import MARK, Mark, read_mark, refuse_live_run
 
 RUN_FILES = (
-    "results.h5", "results.xdmf", "curve.csv", "probes.csv", "modes.csv", "summary.json", "log.txt"
+    *NAMES, "results.h5", "results.xdmf", "curve.csv", "probes.csv", "modes.csv", "summary.json", "log.txt"
 )  # fmt: skip
 STATUSES = ("done", "stopped", "interrupted")
 log = logging.getLogger("ancf")
@@ -32,11 +33,14 @@ class Holding(NamedTuple):
     identity: str
 
 
-def check_folder(path: Path, title: str, identity: str = "", *, force: bool = False) -> None:
+def check_folder(
+    path: Path, title: str, identity: str = "", *, force: bool = False, kept: bool = False
+) -> None:
     """Raise CaseError unless a run of `title` may write into `path`; nothing in it is touched.
 
     A folder may be new, empty, or hold an earlier run of the same case: of the same `identity`, a hash of
-    effective case and mesh. `force` allows any other, but never one that a live run writes into.
+    effective case and mesh. `force` allows any other, but never one that a live run writes into. `kept`: the run goes on
+    with what is there, which has been looked at.
     """
     path = Path(path)
     if "\0" in str(path):
@@ -49,7 +53,7 @@ def check_folder(path: Path, title: str, identity: str = "", *, force: bool = Fa
         with tempfile.TemporaryFile(dir=there):
             pass
     except OSError as error:
-        if error_number(error) in (errno.ENOSPC, errno.EDQUOT):
+        if kept or error_number(error) in (errno.ENOSPC, errno.EDQUOT):
             raise cannot_write(error, path / "results.h5") from error
         raise CaseError(
             f"cannot be written: {error.strerror or error}",
@@ -59,7 +63,7 @@ def check_folder(path: Path, title: str, identity: str = "", *, force: bool = Fa
         ) from error
     if there == path:
         refuse_live_run(path, force=force)
-        _refuse_other_content(path, Holding(title, identity), force=force)
+        _refuse_other_content(path, Holding(title, identity), force=force or kept)
 
 
 def _refuse_other_content(path: Path, ours: Holding, *, force: bool) -> None:
@@ -146,6 +150,7 @@ def claim_folder(path: Path, title: str = "", identity: str = "", *, force: bool
         earlier = run_in(path)
         mark.take({"title": title, "hash": identity}, force=force)
         _refuse_other_content(path, Holding(title, identity), force=force)
+        sweep(path)
         for name in RUN_FILES:
             (path / name).unlink(missing_ok=True)
             (path / f"{name}.part").unlink(missing_ok=True)
@@ -158,6 +163,20 @@ def claim_folder(path: Path, title: str = "", identity: str = "", *, force: bool
     except CaseError:
         mark.release()
         raise
+    return mark
+
+
+def reclaim_folder(path: Path, title: str = "", identity: str = "", *, force: bool = False) -> Mark:
+    """Mark a folder as a live run's that goes on with what is in it; its summary goes. Raises CaseError, EnvironmentProblem."""
+    mark = Mark(path)
+    try:
+        refuse_live_run(path, force=force)
+        mark.take({"title": title, "hash": identity}, force=force)
+        sweep(path)
+        (path / "summary.json").unlink(missing_ok=True)
+    except OSError as error:
+        mark.release()
+        raise cannot_write(error, error.filename or path) from error
     return mark
 
 

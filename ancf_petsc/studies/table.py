@@ -130,7 +130,12 @@ class StudyOutcome:
 
     def _quantity(self, name: str, asked: QuantitySpec) -> Cells:
         reference = self.references.get(name)
-        said: Cells = {"column": asked.column, "summary": asked.summary, "reduce": asked.reduce}
+        said: Cells = {
+            "column": asked.column,
+            "summary": asked.summary,
+            "reduce": asked.reduce,
+            "against": asked.against,
+        }
         if isinstance(asked.at, OutputAt):
             said["at"] = "end" if asked.at.column == "end" else {asked.at.column: asked.at.value}
         said["unit"] = "" if asked.against else unit_of(asked.column or "", self.study.base.spec.units)

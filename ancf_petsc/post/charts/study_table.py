@@ -17,6 +17,8 @@ from ancf_petsc.post.units import Units, read_units
 
 TABLE, FACTS = "study.csv", "study.json"
 NEEDED = ("status", "outcome", "run")
+NOT_RUN = "not_run"
+"""Outcome of runs that are still to come, or that another share of the study does."""
 ENDED = ("reached", "cut_steps", "energy_grown")
 """Outcomes of runs that came to the end that was asked for."""
 
@@ -54,7 +56,7 @@ class StudyRow:
 
 @dataclass(frozen=True)
 class StudyTable:
-    """keys: values of each varied key in the order of the study. quantities, orders: as in study.json."""
+    """keys: values of each varied key in the order of the study. quantities, orders: as in study.json; facts: all of it."""
 
     folder: Path
     title: str
@@ -65,6 +67,7 @@ class StudyTable:
     orders: list[dict[str, Any]] = field(default_factory=list)
     charts: list[ChartSpec] = field(default_factory=list)
     note: str = ""
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
     def is_numeric(self, key: str) -> bool:
         """Whether all values of a key or column are numbers; a code such as 3413, in quotes in the study, is none."""
@@ -102,10 +105,8 @@ def read_study(folder: str | Path) -> StudyTable:
             expected="title, axes, quantities and charts",
             cure="run ancf study again: finished runs are not repeated",
         ) from error
-    units = read_units(str(facts.get("units") or ""))
-    return StudyTable(
-        folder, title, units, keys, rows, quantities, orders, charts, str(facts.get("note") or "")
-    )
+    units, note = read_units(str(facts.get("units") or "")), str(facts.get("note") or "")
+    return StudyTable(folder, title, units, keys, rows, quantities, orders, charts, note, facts)
 
 
 def _facts(path: Path) -> dict[str, Any]:
@@ -129,6 +130,7 @@ def _rows(path: Path) -> list[StudyRow]:
         with path.open(encoding="utf-8", newline="") as file:
             reader = csv.DictReader(file)
             rows = [StudyRow({k: v or "" for k, v in row.items() if k is not None}) for row in reader]
+            rows = [row for row in rows if row.text("outcome") != NOT_RUN]
             columns = reader.fieldnames or ()
     except (OSError, ValueError, csv.Error) as error:
         raise CaseError(f"cannot be read: {error}", file=path, cure="run ancf study again") from error
