@@ -29,6 +29,7 @@ VERBS = {
     "plot": ("ancf_petsc.cli.plot", "draw the curves of runs"),
     "view": ("ancf_petsc.cli.view", "look at a run, or at a case before it runs"),
     "study": ("ancf_petsc.cli.study", "run a case with keys varied, tabulate errors and costs"),
+    "advise": ("ancf_petsc.cli.advise", "find the cheapest element, mesh and step within an error"),
     "info": ("ancf_petsc.cli.info", "versions, elements, self-check"),
     "modes": ("ancf_petsc.cli.modes", "natural frequencies and shapes of a case's body"),
     "mesh": ("ancf_petsc.cli.mesh", "make one of the project's meshes at a size"),

@@ -55,6 +55,8 @@ def _is_number(value: object) -> bool:
 
 
 def _at(value: object) -> OutputAt:
+    if isinstance(value, OutputAt):
+        return value
     if value == END:
         return OutputAt(END)
     if isinstance(value, Mapping) and len(value) == 1:
