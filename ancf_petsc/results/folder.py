@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ancf_petsc.errors import CaseError, cannot_write, error_number
-from ancf_petsc.results.checkpoint_file import NAMES, sweep
+from ancf_petsc.results.checkpoint_file import NAMES, sweep, sync
 from ancf_petsc.results.mark import MARK, Mark, read_mark, refuse_live_run
 
 RUN_FILES = (
@@ -181,10 +181,13 @@ def reclaim_folder(path: Path, title: str = "", identity: str = "", *, force: bo
 
 
 def write_atomic(path: Path, text: str) -> None:
-    """Replace a file as a whole: a reader sees the old text or the new, never a part. Raises OSError."""
+    """Replace a file as a whole: a reader sees the old text or the new, never a part, after a power cut neither. Raises
+    OSError.
+    """
     part = path.with_name(path.name + ".part")
     try:
         part.write_text(text, encoding="utf-8")
+        sync(part)
         os.replace(part, path)
     except OSError:
         with suppress(OSError):
@@ -209,6 +212,9 @@ def write_summary(
     **more: Any,
 ) -> None:
     """seconds: import, read, setup, solve, output, total; memory: per rank; iterations: newton, linear."""
+    for name in RUN_FILES:  # what the summary says is there has to be on the disk before it
+        if (folder / name).is_file():
+            sync(folder / name)
     if status not in STATUSES:
         raise ValueError(f"status {status!r} is none of {STATUSES}")
     summary = {
