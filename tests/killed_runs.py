@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import signal
@@ -78,6 +79,8 @@ def cut_power(folder: Path, dice: random.Random) -> str:
     """Lose what the disk had not promised to keep: ends of growing files, and perhaps the newest checkpoint or its rename. What
     was lost, in words.
     """
+    if is_done(folder):
+        return "nothing: the run was done"
     whole, _ = all_in(folder) if folder.is_dir() else ([], {})
     lost = ""
     if len(whole) == 2 and dice.random() < 0.5:
@@ -96,6 +99,14 @@ def cut_power(folder: Path, dice: random.Random) -> str:
         size = results.stat().st_size
         os.truncate(results, dice.randrange(min(promised, size), size + 1))
     return f"power cut, newest checkpoint {lost}" if lost else "power cut"
+
+
+def is_done(folder: Path) -> bool:
+    """Whether a run says that it came to its end: all of it is on the disk then."""
+    try:
+        return json.loads((folder / "summary.json").read_text())["status"] == "done"
+    except OSError:
+        return False
 
 
 def has_checkpoint(folder: Path) -> bool:

@@ -58,3 +58,28 @@ def test_ranks_that_are_killed_lose_nothing(environment, tmp_path):
     for name in ("curve", "probes"):
         one, other = (getattr(open_results(tmp_path / folder), name) for folder in ("whole", "run"))
         assert {key: len(column) for key, column in one.items()} == {k: len(c) for k, c in other.items()}
+
+
+@pytest.mark.parametrize(
+    ("where", "ranks", "rank"),
+    [
+        ("reading", 2, 1),
+        ("set-up", 3, 2),
+        ("kernel", 2, 1),
+        ("solver", 3, 1),
+        ("output", 2, 1),
+        ("an error of the program", 2, 1),
+    ],
+)
+def test_a_rank_that_fails_ends_all_with_its_message(where, ranks, rank, mpirun, project, tmp_path):
+    """Within five seconds of the failure, and never with success."""
+    (tmp_path / "case.toml").write_text(STATIC.text)
+    program = project / "tests" / "one_rank_fails.py"
+    done = mpirun(ranks, [program, where, str(rank), "case.toml", "run"], code=None)
+    ended = time.time()
+    failed = float((tmp_path / "run.failed").read_text())
+    assert done.returncode != 0
+    words = "of one rank alone" if "program" in where else f"no {where}"
+    assert words in done.stderr
+    assert f"rank {rank}" in done.stderr
+    assert ended - failed < 5.0

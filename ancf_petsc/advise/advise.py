@@ -17,7 +17,7 @@ from ancf_petsc.advise.motion import SPACE, Timing, timings
 from ancf_petsc.advise.question import read_quantity, read_target
 from ancf_petsc.advise.report import Advice, Recommendation, percent
 from ancf_petsc.advise.scene import working_case
-from ancf_petsc.advise.search import FIRST, SearchResult, begin, search
+from ancf_petsc.advise.search import FIRST, Ranking, begin, search
 from ancf_petsc.advise.steps import STEPS, fewest_steps
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input.load import Case
@@ -133,7 +133,7 @@ def _announcement(work: _Search) -> str:
     )
 
 
-def _statics(work: _Search) -> tuple[SearchResult, None]:
+def _statics(work: _Search) -> tuple[Ranking, None]:
     if work.free:
         count = _first_steps(work)
         for line in work.lines:
@@ -155,7 +155,7 @@ def _first_steps(work: _Search) -> int:
     return own.steps or 1 if own else 1
 
 
-def _steps_of_best(work: _Search, found: SearchResult, guess: BestGuess) -> SearchResult:
+def _steps_of_best(work: _Search, found: Ranking, guess: BestGuess) -> Ranking:
     """Whether fewer or more steps are cheaper for the best: tried where it stands, if that is affordable."""
     best = found.choices[0]
     count = int(best.line.more[STEPS])
@@ -168,10 +168,10 @@ def _steps_of_best(work: _Search, found: SearchResult, guess: BestGuess) -> Sear
         changed = best.line.make(work.lab, best.level)
         if changed is None or changed.value is None:
             best.line.more = {**best.line.more, STEPS: count}
-    return SearchResult(guess, ranked(work.lines, guess, work.target), found.complete)
+    return Ranking(guess, ranked(work.lines, guess, work.target), found.complete)
 
 
-def _motion(work: _Search) -> tuple[SearchResult, Timing | None]:
+def _motion(work: _Search) -> tuple[Ranking, Timing | None]:
     """Time on one coarse mesh first, then space with the cheapest integrator that was good enough."""
     ways: list[Timing] = []
     for line in work.lines:
@@ -180,7 +180,7 @@ def _motion(work: _Search) -> tuple[SearchResult, Timing | None]:
             break
     if not ways:
         work.notes.append("no integrator was within its share of the target on a coarse mesh")
-        return SearchResult(None, [], complete=False), None
+        return Ranking(None, [], complete=False), None
     for way in ways:
         drift = f"energy drifts by {100 * way.drift:.2g} % of the largest"
         work.notes.append(
@@ -194,13 +194,11 @@ def _motion(work: _Search) -> tuple[SearchResult, Timing | None]:
     found = search(work.lines, work.lab, SPACE * work.target)
     if found.choices and found.guess:
         best = _cheaper_in_time(work, found, found.guess, ways)
-        found = SearchResult(
-            found.guess, ranked(work.lines, found.guess, SPACE * work.target), found.complete
-        )
+        found = Ranking(found.guess, ranked(work.lines, found.guess, SPACE * work.target), found.complete)
     return found, best
 
 
-def _cheaper_in_time(work: _Search, found: SearchResult, guess: BestGuess, ways: list[Timing]) -> Timing:
+def _cheaper_in_time(work: _Search, found: Ranking, guess: BestGuess, ways: list[Timing]) -> Timing:
     """The integrator that is cheapest on the mesh that was chosen: costs change with the mesh."""
     choice, best = found.choices[0], ways[0]
     cheapest = choice.seconds
@@ -219,7 +217,7 @@ def _cheaper_in_time(work: _Search, found: SearchResult, guess: BestGuess, ways:
     return best
 
 
-def _advice(work: _Search, found: SearchResult, timing: Timing | None, case: Case, quantity: str) -> Advice:
+def _advice(work: _Search, found: Ranking, timing: Timing | None, case: Case, quantity: str) -> Advice:
     guess = found.guess
     known = guess is not None and guess.uncertainty <= work.target
     made = [_recommended(choice, guess, timing, work) for choice in found.choices[:2]] if known else []

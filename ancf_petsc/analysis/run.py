@@ -28,7 +28,7 @@ from ancf_petsc.input.load import Case
 from ancf_petsc.kernel.warmup import compile_kernels, is_compiled
 from ancf_petsc.log import log_file
 from ancf_petsc.material import law_named
-from ancf_petsc.parallel.exchange import on_root
+from ancf_petsc.parallel.exchange import all_meet, on_root
 from ancf_petsc.parallel.fields import Places
 from ancf_petsc.plan.plan import Plan, make_plan
 from ancf_petsc.results.folder import check_folder, claim_folder, reclaim_folder
@@ -90,8 +90,14 @@ def run_case(
                 _solve(case, built, solver, Ending(folder, clock, about, mark), watch, resumed)
             given.refuse_unused(comm)
         finally:
-            solver.destroy()
+            if comm.size == 1 or _is_of_all_ranks(sys.exc_info()[1]):
+                solver.destroy()
     return folder
+
+
+def _is_of_all_ranks(error: BaseException | None) -> bool:
+    """Whether the others end here too: freeing PETSc's objects would wait for them."""
+    return error is None or isinstance(error, AncfError)
 
 
 def _find(comm: MPI.Comm, folder: Path, about: Provenance | None, *, extend: bool) -> Found:
@@ -176,6 +182,8 @@ def _solve(
     except (
         AncfError
     ) as error:  # of all ranks; any other error is of this one alone, and summing up would wait
+        if not all_meet(comm):
+            raise RuntimeError(f"this rank alone met: {error}") from error
         failure = error
         raise
     finally:

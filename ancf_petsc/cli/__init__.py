@@ -60,6 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as leave:
         return leave.code if isinstance(leave.code, int) else int(leave.code is not None)
     except AncfError as error:
+        _end_others_unless_they_know(error)
         return _print_error(error)
     except ImportError as error:
         from ancf_petsc.cli.packages import import_problem
@@ -84,6 +85,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if rank_count() == 1:
             raise
         sys.excepthook(*sys.exc_info())
+        print(f"error: rank {rank()}: {sys.exc_info()[1]!r}", file=sys.stderr, flush=True)
         _abort_others(1)
         return 1
     return code
@@ -217,6 +219,18 @@ def _print_error(error: AncfError) -> int:
 def _mpi() -> Any:
     """mpi4py.MPI if this process has started MPI."""
     return sys.modules.get("mpi4py.MPI")
+
+
+def _end_others_unless_they_know(error: AncfError) -> None:
+    """Errors of this program are raised on all ranks. One that is raised on this rank alone leaves the others waiting for it."""
+    mpi = _mpi()
+    if rank_count() == 1 or mpi is None:
+        return
+    from ancf_petsc.parallel.exchange import all_meet
+
+    if not all_meet(mpi.COMM_WORLD):
+        print(f"error: rank {rank()}, alone: {error}", file=sys.stderr, flush=True)
+        _abort_others(error.exit_code)
 
 
 def _abort_others(code: int) -> None:
