@@ -175,7 +175,7 @@ def write_labels(figure: Figure, labels: Sequence[tuple[Axes, Sequence[EndLabel]
                 as_typed(label.text) if label.colour != GREY else label.text, (x, label.y), xycoords=transform,
                 xytext=(1.03, 0.5), textcoords="axes fraction", color=label.colour, fontsize=FONT, va="center",
                 arrowprops={"arrowstyle": "-", "color": label.colour, "linewidth": 0.6, "alpha": 0.55,
-                            "shrinkA": 1, "shrinkB": 3},
+                            "shrinkA": 1, "relpos": (0.0, 0.5), "shrinkB": 3},
                 annotation_clip=False,
             )  # fmt: skip
             pairs.append((label, text))
