@@ -161,6 +161,16 @@ def test_values_have_lines_predictions_and_relative_heights(motion):
     assert [p.y for p in relative.lines[2].shown] == pytest.approx([1, 2, 4, 8])
 
 
+def test_values_may_stand_at_equal_distances_and_predictions_between_them(motion):
+    spec = chart(
+        kind="values", x="dynamics.step", quantity="drift", lines="initial.spin", panels="dynamics.integrator",
+        x_scale="even", predicted=[{"label": "theory", "points": [[0.01, 1], [0.03, 2], [0.08, 3]]}],
+    )  # fmt: skip
+    _, theta = value_panels(motion, spec)
+    assert [p.x for p in theta.lines[0].shown] == [0, 1, 2, 3]
+    assert [p.x for p in theta.predicted[0].shown] == [0, 1.5, 3]
+
+
 def test_curves_are_sums_of_columns_over_their_start(motion):
     spec = chart(
         kind="curves", y="kinetic_energy + strain_energy", relative=True,
