@@ -64,7 +64,7 @@ class Layout:
         self.diagonal = self._diagonal()
         self.turned = TurnedBlocks(model.frames, self._blocks(), model.drive >= 0) if model.frames else None
 
-    def _blocks(self) -> tuple[Integers, Integers, Integers, Integers]:
+    def _blocks(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         """Rows, columns, first places and strides (b,) of all blocks, columns of local nodal vectors."""
         parts = []
         for side, (pointers, columns) in enumerate((self.rows[:2], self.rows[2:4])):
@@ -72,7 +72,7 @@ class Layout:
             rows = np.repeat(np.arange(len(counts)), counts)
             within = np.arange(len(columns)) - pointers[rows]
             starts = side * self.rows.split + 9 * pointers[rows] + 3 * within
-            parts.append((rows, columns.astype(np.int64), starts, 3 * counts[rows]))
+            parts.append((rows, columns, starts, 3 * counts[rows]))
         rows, columns, starts, strides = (np.concatenate(both) for both in zip(*parts, strict=True))
         return rows, columns, starts, strides
 

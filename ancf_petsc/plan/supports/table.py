@@ -83,7 +83,7 @@ class SupportTable:
         nodes = np.unique(np.concatenate([vectors for _, vectors, _ in self._normals]))
         member = np.stack([np.isin(nodes, vectors) for _, vectors, _ in self._normals], axis=1)
         asked, which = np.unique(np.hstack((member, self.drive[nodes])), axis=0, return_inverse=True)
-        axes = []
+        axes: list[NDArray[np.float64]] = []
         for number, row in enumerate(asked):
             here, drive = nodes[which.ravel() == number], row[member.shape[1] :]
             wanted = [
