@@ -227,10 +227,11 @@ def signed(assembly: Assembly, mode: NDArray) -> NDArray:
     """The mode (n, 3) with the sign that its place and direction say. Collective."""
     own = assembly.model.own_positions
     _, along = place_of(assembly, mode)
-    place = int(np.argmax(np.linalg.norm(mode[own], axis=1))) if len(own) else -1
+    moved = assembly.along_axes(mode)
+    place = int(np.argmax(np.linalg.norm(moved[own], axis=1))) if len(own) else -1
     best = (0.0, 1.0)
     if place >= 0:
-        v = mode[own[place]]
+        v = moved[own[place]]
         best = (float(np.linalg.norm(v)), float(np.sign(v @ np.array(along)) or 1.0))
     return mode * max(assembly.comm.allgather(best), key=lambda item: item[0])[1]
 
@@ -245,7 +246,7 @@ def place_of(assembly: Assembly, mode: NDArray) -> tuple[tuple[float, ...], tupl
     """Where a mode (n, 3) moves most, undeformed and in the file's coordinates, and the unit vector along which. Of places
     that differ by rounding, the first of the file. Collective.
     """
-    model, comm = assembly.model, assembly.comm
+    model, comm, mode = assembly.model, assembly.comm, assembly.along_axes(mode)
     own = model.own_positions
     size = np.linalg.norm(mode[own], axis=1)
     largest = combined(comm, float(size.max(initial=0.0)), MPI.MAX)
