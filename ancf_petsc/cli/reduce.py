@@ -16,6 +16,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     add_case_arguments(parser)
     parser.add_argument("--to", required=True, choices=KINDS_OF_PARTS, help="what of the body is kept")
+    parser.add_argument(
+        "--size", type=float, metavar="H", help="length of edges of a section (default that of the body's)"
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="the folder to write (default NAME-TO)")
 
 
@@ -29,7 +32,7 @@ def execute(arguments: argparse.Namespace) -> int:
 
     def write() -> None:
         case = load_case(arguments.case, changes(arguments))
-        smaller = reduce(case, arguments.to)
+        smaller = reduce(case, arguments.to, arguments.size)
         folder = arguments.out or Path(f"{case.name}-{arguments.to}")
         _, plan = write_case(smaller, folder)
         for note in smaller.notes:

@@ -64,7 +64,8 @@ class Surface:
         self.mesh = mesh
         self.facets = triangles(boundary_faces(mesh))
         self.normals = normals(mesh.points, self.facets)
-        self.slack = self._slack()
+        at_nodes = self._at_nodes(self._slack())  # a facet between edges of the body may have no neighbour that says it is curved
+        self.slack = at_nodes[self.facets].max(axis=1)
 
     @property
     def shape(self) -> Shape:
@@ -90,10 +91,13 @@ class Surface:
 
     def at_nodes(self) -> Floats:
         """(points,) slack of the facets around each node."""
-        slack = np.zeros(len(self.mesh.points))
+        return self._at_nodes(self.slack)
+
+    def _at_nodes(self, slack: Floats) -> Floats:
+        found = np.zeros(len(self.mesh.points))
         for k in range(3):
-            np.maximum.at(slack, self.facets[:, k], self.slack)
-        return slack
+            np.maximum.at(found, self.facets[:, k], slack)
+        return found
 
     def of_group(self, group: Group) -> Shape:
         """What a load or a support of a group takes of it: faces, else edges, else points."""

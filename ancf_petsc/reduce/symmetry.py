@@ -86,7 +86,7 @@ class Scene:
 
     def _body(self, plane: MirrorPlane) -> str:
         if abs(plane.heights(self.centre[None])[0]) > CLOSE * self.size + float(self.surface.slack.max()):
-            return f"its middle, {_place(self.centre)}, is not on the plane"
+            return f"its middle, {place(self.centre)}, is not on the plane"
         return self._off(plane, self.surface.shape, self.surface.shape, "the surface")
 
     def _off(self, plane: MirrorPlane, shape: Shape, target: Shape, what: str) -> str:
@@ -94,7 +94,7 @@ class Scene:
         worst, which = departure(plane.image(points), slack, target, self.size)
         if worst <= CLOSE:
             return ""
-        return f"{what} at {_place(points[which])} has no mirror image: it lies off by {worst * self.size:.3g}"
+        return f"{what} at {place(points[which])} has no mirror image: it lies off by {worst * self.size:.3g}"
 
     def _unmatched(self, plane: MirrorPlane, action: Action) -> str:
         held, amount = plane.matrix @ action.held @ plane.matrix, plane.matrix @ action.amount
@@ -112,10 +112,10 @@ def _breaks(plane: MirrorPlane, key: str, vector: Floats, kind: str) -> str:
     image = plane.matrix @ vector * (-1.0 if kind == "spin" else 1.0)
     if np.abs(image - vector).max() <= SAME * np.abs(vector).max():
         return ""
-    return f"{key}: its direction {_place(vector)} is not {'normal to' if kind == 'spin' else 'in'} the plane"
+    return f"{key}: its direction {place(vector)} is not {'normal to' if kind == 'spin' else 'in'} the plane"
 
 
-def _place(point: Floats) -> str:
+def place(point: Floats) -> str:
     return f"({', '.join(f'{value:.6g}' for value in point)})"
 
 
@@ -144,7 +144,7 @@ def candidates(scene: Scene) -> list[MirrorPlane]:
     values, vectors = np.linalg.eigh(scene.inertia)
     gaps = np.abs(values[:, None] - values) + np.eye(3) * values.max()
     own = [vectors[:, k] for k in range(3) if gaps[k].min() > DISTINCT * values.max()]
-    flat = [normal for action in scene.actions if (normal := _flat_normal(action.shape)) is not None]
+    flat = [normal for action in scene.actions if (normal := flat_normal(action.shape)) is not None]
     first = _different([*np.eye(3), *own, *flat])
     between = [
         sign * b + a for i, a in enumerate(first) for b in first[i + 1 :] if abs(a @ b) < SAME for sign in (1.0, -1.0)
@@ -154,7 +154,7 @@ def candidates(scene: Scene) -> list[MirrorPlane]:
     ]
 
 
-def _flat_normal(shape: Shape) -> Floats | None:
+def flat_normal(shape: Shape) -> Floats | None:
     """The normal of a shape that lies in a plane."""
     points = shape.corners.reshape(-1, 3)
     if shape.corners.shape[1] < 3:

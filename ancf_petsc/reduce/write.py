@@ -9,16 +9,18 @@ from ancf_petsc.input.load import CASE_FILE, Case, load_case
 from ancf_petsc.plan.plan import Plan, make_plan
 from ancf_petsc.reduce.half import HALVES, QUARTER, reduced_by_planes
 from ancf_petsc.reduce.mesh_file import write_mesh
+from ancf_petsc.reduce.section import reduced_to_section
 from ancf_petsc.reduce.symmetry import Scene
 from ancf_petsc.reduce.tables import SmallerCase
 
 MESH_FILE = "mesh.msh"
-KINDS_OF_PARTS = (*HALVES, QUARTER)
+SECTION = "section"
+KINDS_OF_PARTS = (*HALVES, QUARTER, SECTION)
 """What a case can be reduced to."""
 
 
-def reduce(case: Case, to: str) -> SmallerCase:
-    """The smaller case of a kind. Raises CaseError where the scene does not allow it, with the reason."""
+def reduce(case: Case, to: str, size: float | None = None) -> SmallerCase:
+    """The smaller case of a kind. size: length of edges of a section, by default those of the body. Raises CaseError where the scene does not allow it, with the reason."""
     plan = make_plan(case)
     if plan.element.cell.dimension != 3:
         raise CaseError(
@@ -28,7 +30,8 @@ def reduce(case: Case, to: str) -> SmallerCase:
             got=plan.element.code,
             expected="a solid element",
         )
-    return reduced_by_planes(Scene(case, plan), to)
+    scene = Scene(case, plan)
+    return reduced_to_section(scene, size) if to == SECTION else reduced_by_planes(scene, to)
 
 
 def write_case(smaller: SmallerCase, folder: Path) -> tuple[Case, Plan]:
