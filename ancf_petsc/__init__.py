@@ -35,6 +35,7 @@ _HOMES = {
     "Interrupted": "ancf_petsc.errors",
     "MeshError": "ancf_petsc.errors",
     "NoEquilibrium": "ancf_petsc.errors",
+    "study": "ancf_petsc.studies.drawn",
 }
 __all__ = ["run", *_HOMES]
 

@@ -1,4 +1,4 @@
-"""docs/verification.md from docs/verification/checks.json and mutations.json."""
+"""docs/verification.md from docs/verification/checks.json, platforms.json and mutations.json."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from typing import Any
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 CHECKS, MUTATIONS = DOCS / "verification" / "checks.json", DOCS / "verification" / "mutations.json"
+PLATFORMS = DOCS / "verification" / "platforms.json"
 PAGE = DOCS / "verification.md"
 HEAD = """# Verification
 
 *Made by `scripts/verify` from `docs/verification/`; do not edit.* `scripts/verify` computes every number under *found* again and
-ends with exit code 1 if an error is beyond its bound. `scripts/mutate` makes the last table.
+ends with exit code 1 if an error is beyond its bound. `scripts/test_debian` and `scripts/test_current_petsc` make the table of
+platforms, `scripts/mutate` the last one.
 """
 
 
@@ -54,6 +56,30 @@ def checks_part(data: dict[str, Any]) -> list[str]:
     return lines
 
 
+def platforms_part(rows: list[dict[str, Any]]) -> list[str]:
+    """How the suite ended on each PETSc and MPI it was last run on."""
+    lines = ["## Where the test suite ran", ""]
+    lines += [
+        "| PETSc, SLEPc | MPI | system, Python | numpy, h5py | PETSc has | date | passed | failed | skipped |"
+    ]
+    lines += ["|---|---|---|---|---|---|---|---|---|"]
+    for row in rows:
+        parallel = " with MPI" if row["h5py_with_mpi"] else " without MPI"
+        words = (
+            f"{row['petsc']}, {row['slepc']}",
+            row["mpi"],
+            f"{row['system']}, {row['python']}",
+            f"{row['numpy']}, {row['h5py']}{parallel}",
+            ", ".join(row["packages"]),
+            row["date"],
+            str(row["passed"]),
+            f"**{row['failed']}**: {', '.join(row['failures'])}" if row["failed"] else "0",
+            str(row["skipped"]),
+        )
+        lines.append("| " + " | ".join(cell(word) for word in words) + " |")
+    return [*lines, ""]
+
+
 def mutations_part(rows: list[dict[str, Any]]) -> list[str]:
     """Wrong changes: survivors first, then which test caught each."""
     survivors = [row for row in rows if not row["caught_by"]]
@@ -90,6 +116,8 @@ def write_page() -> Path:
     lines = [HEAD]
     if CHECKS.is_file():
         lines += checks_part(json.loads(CHECKS.read_text()))
+    if PLATFORMS.is_file():
+        lines += platforms_part(json.loads(PLATFORMS.read_text()))
     if MUTATIONS.is_file():
         lines += mutations_part(json.loads(MUTATIONS.read_text()))
     PAGE.write_text("\n".join(lines).rstrip("\n") + "\n", encoding="utf-8")

@@ -28,6 +28,7 @@ VERBS = {
     "check": ("ancf_petsc.cli.check", "check a case and its mesh, solve nothing"),
     "plot": ("ancf_petsc.cli.plot", "draw the curves of runs"),
     "view": ("ancf_petsc.cli.view", "look at a run, or at a case before it runs"),
+    "study": ("ancf_petsc.cli.study", "run a case with keys varied, tabulate errors and costs"),
     "info": ("ancf_petsc.cli.info", "versions, elements, self-check"),
     "modes": ("ancf_petsc.cli.modes", "natural frequencies and shapes of a case's body"),
     "mesh": ("ancf_petsc.cli.mesh", "make one of the project's meshes at a size"),
@@ -60,11 +61,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return leave.code if isinstance(leave.code, int) else int(leave.code is not None)
     except AncfError as error:
         return _print_error(error)
-    except ModuleNotFoundError as error:
-        if (error.name or "").startswith("ancf_petsc"):
+    except ImportError as error:
+        from ancf_petsc.cli.packages import import_problem
+
+        if (problem := import_problem(error, words[0])) is None:
             raise
-        cure = "run scripts/setup, or use environment.yml"
-        return _print_error(EnvironmentProblem(f"the Python package {error.name} is missing; {cure}"))
+        return _print_error(problem)
     except KeyboardInterrupt:
         _abort_others(Interrupted.exit_code)
         return _print_error(Interrupted("interrupted"))

@@ -19,13 +19,13 @@ from ancf_petsc.motion.equations import Equations
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.linear.solver import LinearSolver
 from ancf_petsc.solve.newton import MOST_ITERATIONS
-from ancf_petsc.solve.petsc import default_options
+from ancf_petsc.solve.petsc import NOT_FINITE, default_options
 
 Reason = PETSc.SNES.ConvergedReason
 SLOW = 0.1  # a residual that falls by less asks for a new matrix: factoring costs some five iterations
 ROUNDING = 4e-16  # of a position: what it leaves of forces is this times stiffness and position
 WORDS = {
-    Reason.DIVERGED_FNORM_NAN: "forces are not finite",
+    NOT_FINITE: "forces are not finite",
     Reason.DIVERGED_MAX_IT: f"no convergence in {MOST_ITERATIONS} Newton iterations",
     Reason.DIVERGED_LINE_SEARCH: "no step along Newton's direction lowers the out-of-balance force",
     Reason.DIVERGED_LINEAR_SOLVE: "the linear solver failed",
@@ -63,7 +63,7 @@ class ForceTest:
     def __call__(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         residual = norms[2]
         if not isfinite(residual):
-            return Reason.DIVERGED_FNORM_NAN
+            return NOT_FINITE
         forces = sqrt(combined(self.matrix.comm, self.scale))
         relative, absolute = snes.getTolerances()[:2]
         if iteration:

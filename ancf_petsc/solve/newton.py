@@ -17,7 +17,7 @@ from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.forcing import Forcing
 from ancf_petsc.solve.linear.solver import LinearSolver
-from ancf_petsc.solve.petsc import default_options, is_given
+from ancf_petsc.solve.petsc import NOT_FINITE, default_options, is_given
 from ancf_petsc.solve.step_control import StepControl
 
 log = logging.getLogger("ancf")
@@ -27,7 +27,7 @@ QUICK, CAREFUL = "basic", "bt"
 PREDICTOR_TERM = 1e-8  # the path's slope is made of it, and extrapolated from
 Reason = PETSc.SNES.ConvergedReason
 WORDS = {
-    Reason.DIVERGED_FNORM_NAN: "a state with det F <= 0 or forces that are not finite was met",
+    NOT_FINITE: "a state with det F <= 0 or forces that are not finite was met",
     Reason.DIVERGED_MAX_IT: f"no convergence in {MOST_ITERATIONS} iterations",
     Reason.DIVERGED_LINE_SEARCH: "no step along Newton's direction lowers the out-of-balance force",
     Reason.DIVERGED_LINEAR_SOLVE: "the linear solver failed",
@@ -206,7 +206,7 @@ class Newton:
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         residual = norms[2]
         if not np.isfinite(residual):
-            return Reason.DIVERGED_FNORM_NAN
+            return NOT_FINITE
         scale = self._force_scale()
         relative = residual / scale if scale else 0.0
         if iteration:

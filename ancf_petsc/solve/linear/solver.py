@@ -19,7 +19,7 @@ from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.solve.linear.rigid import rigid_motions
 from ancf_petsc.solve.linear.two_level import TwoLevel
-from ancf_petsc.solve.petsc import default_options, is_given
+from ancf_petsc.solve.petsc import default_options, direct_package, is_given
 
 DIRECT_LIMIT, CURVED_LIMIT = 300, 5_000  # measured by `ancf bench alternatives/direct alternatives/iterative`
 TWO_LEVEL_LIMIT, MOST_RANKS = (
@@ -70,7 +70,7 @@ class LinearSolver:
         if self.direct:
             self.ksp.setType(PETSc.KSP.Type.PREONLY)
             pc.setType(PETSc.PC.Type.CHOLESKY if self.matrix.symmetric else PETSc.PC.Type.LU)
-            pc.setFactorSolverType("petsc" if self.small else "mumps")
+            pc.setFactorSolverType("petsc" if self.small else direct_package())
             if self.small:
                 pc.setFactorOrdering("qmd")
             return
