@@ -52,7 +52,7 @@ def actions_on_shapes(case: Case, plan: Plan, surface: Surface) -> list[Action]:
 
 
 def _supports(case: Case, plan: Plan, surface: Surface) -> list[Action]:
-    """One for each group and ramp; those that do the same on several groups are one."""
+    """One for each group and ramp, and each dimension of what the group is meshed with."""
     by_group: dict[tuple[str, object], tuple[Floats, Floats]] = {}
     for row in case.spec.constraint:
         ramp = row.ramp if any(row.move.values()) else None
@@ -60,36 +60,35 @@ def _supports(case: Case, plan: Plan, surface: Surface) -> list[Action]:
         for axis in (*row.fix, *row.move):
             i = AXES.index(axis)
             held[i, i], amount[i] = 1.0, row.move.get(axis, 0.0)
-    merged: list[list] = []
-    for (name, ramp), (held, amount) in by_group.items():
-        alike = next((m for m in merged if m[1] == ramp and (m[2] == held).all() and (m[3] == amount).all()), None)
-        if alike:
-            alike[0].append(name)
-        else:
-            merged.append([[name], ramp, held, amount])
     return [
-        Action(f"constraint.{names[0]}", "support", shape, held, amount, ramp, tuple(names))
-        for names, ramp, held, amount in merged
-        for shape in _shapes_of_support(plan.mesh, surface, names)
+        Action(f"constraint.{name}", "support", shape, held, amount, ramp, (name,))
+        for (name, ramp), (held, amount) in by_group.items()
+        for shape in _shapes_of_support(plan.mesh, surface, name)
     ]
 
 
-def _shapes_of_support(mesh: Mesh, surface: Surface, names: list[str]) -> list[Shape]:
-    """Faces, edges and points of the groups together, each kind a shape; nodes that faces cover are no points."""
-    slack = surface.at_nodes()
-    kinds: dict[int, list[NDArray]] = {}
-    for name in names:
-        group = mesh.groups[name]
-        parts = parts_for_support(mesh, group)
-        covered = np.concatenate([rows.ravel() for d, rows in parts.items() if d] or [np.empty(0, np.int64)])
-        alone = np.setdiff1d(group.nodes, covered)
-        for d, rows in parts.items():
-            if d in (1, 2):
-                kinds.setdefault(d, []).append(triangles(rows) if d == 2 else rows[:, :2])
-        if len(alone) and not any(d == 2 for d in parts):
-            kinds.setdefault(0, []).append(alone[:, None])
-    joined = [np.concatenate(rows) for rows in kinds.values()]
-    return [Shape(mesh.points[rows], slack[rows].max(axis=1)) for rows in joined]
+def _shapes_of_support(mesh: Mesh, surface: Surface, name: str) -> list[Shape]:
+    """Faces, edges and points of a group, each kind a shape; nodes that belong to its faces or edges are no points."""
+    slack, group = surface.at_nodes(), mesh.groups[name]
+    parts = parts_for_support(mesh, group)
+    covered = np.concatenate([rows.ravel() for d, rows in parts.items() if d] or [np.empty(0, np.int64)])
+    alone = np.setdiff1d(group.nodes, covered)
+    kinds = [triangles(rows) if d == 2 else rows[:, :2] for d, rows in parts.items() if d in (1, 2)]
+    if len(alone) and not any(d == 2 for d in parts):
+        kinds.append(alone[:, None])
+    return [Shape(mesh.points[rows], slack[rows].max(axis=1)) for rows in kinds]
+
+
+def targets(action: Action, others: list[Action], held: Floats, amount: Floats) -> list[Shape]:
+    """Shapes that an action, which does `held` and `amount` after a symmetry, may come to lie on.
+
+    Supports that do the same are one, whatever groups they are in; each force is shared over its own group.
+    """
+    corners = action.shape.corners.shape[1]
+    shapes = [o.shape for o in others if action.same(o, held, amount) and o.shape.corners.shape[1] == corners]
+    if action.kind != "support" or len(shapes) < 2:
+        return shapes
+    return [Shape(np.concatenate([s.corners for s in shapes]), np.concatenate([s.slack for s in shapes]))]
 
 
 def _forces(case: Case, plan: Plan, surface: Surface) -> list[Action]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ancf_petsc.reduce.actions import SAME, Action, directions
+from ancf_petsc.reduce.actions import SAME, Action, directions, targets
 from ancf_petsc.reduce.shape import CLOSE, Floats, Shape, departure
 from ancf_petsc.reduce.symmetry import MirrorPlane, Scene, flat_normal, place
 
@@ -166,7 +166,11 @@ def _moves(scene: Scene, ring: Ring, acting: list[Action]) -> str:
     skin = outside(scene, ring)
     for name, shape, target in [
         ("the surface", skin, scene.surface.shape),
-        *((f"{action.key}: {' and '.join(action.groups)}", action.shape, action.shape) for action in acting),
+        *(
+            (f"{action.key}: {' and '.join(action.groups)}", action.shape, target)
+            for action in acting
+            for target in targets(action, acting, action.held, action.amount)[:1]
+        ),
     ]:
         points, slack = shape.samples
         for part in TURNS:

@@ -9,7 +9,7 @@ import numpy as np
 from ancf_petsc.axes import AXES
 from ancf_petsc.errors import CaseError
 from ancf_petsc.mesh.gmsh_session import gmsh_session
-from ancf_petsc.mesh.kinds import KINDS
+from ancf_petsc.mesh.kinds import KINDS, determinants
 from ancf_petsc.mesh.mesh import Group, Integers, Mesh
 from ancf_petsc.reduce.caps import nested
 from ancf_petsc.reduce.profile import Profile, profile_of
@@ -20,7 +20,8 @@ from ancf_petsc.reduce.tables import SmallerCase, tables_of
 
 STRAIGHT = 0.02
 """Of an edge: points of the section nearer than this to the straight line between others are left out."""
-ELEMENTS = {"3413": "2312"}
+LINEAR = "2312"
+ELEMENTS = {"3413": LINEAR}
 OTHERWISE = "2-6-1-2"
 """The element of the section for that of the body."""
 
@@ -169,12 +170,18 @@ def meshed(profile: Profile, radial: int, axial: int, size: float | None) -> Mes
     return Mesh(
         points=points,
         kind="triangle",
-        cells=cells.reshape(-1, 3),
+        cells=_oriented(points, cells.reshape(-1, 3)),
         groups=groups,
         node_numbers=1 + np.arange(len(used)),
-        cell_numbers=1 + np.arange(len(cells.ravel()) // 3),
+        cell_numbers=1 + np.arange(cells.size // 3),
         used=np.ones(len(used), bool),
     )
+
+
+def _oriented(points: Floats, cells: Integers) -> Integers:
+    """Triangles (e, 3) seen counterclockwise from the positive side of the axis across them."""
+    back = determinants(points, cells, KINDS["triangle"])[:, 0] < 0
+    return np.where(back[:, None], cells[:, [0, 2, 1]], cells)
 
 
 def _fill_tables(smaller: SmallerCase, scene: Scene, ring: Ring, radial: int, axial: int) -> None:

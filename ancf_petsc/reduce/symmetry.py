@@ -11,7 +11,7 @@ from ancf_petsc.input.load import Case
 from ancf_petsc.mesh.kinds import KINDS, part_sizes
 from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.plan.plan import Plan
-from ancf_petsc.reduce.actions import SAME, Action, actions_on_shapes, directions
+from ancf_petsc.reduce.actions import SAME, Action, actions_on_shapes, directions, targets
 from ancf_petsc.reduce.shape import CLOSE, Floats, Shape, Surface, departure
 
 DISTINCT = 1e-3
@@ -47,11 +47,11 @@ class MirrorPlane:
     def describe(self) -> str:
         """Such as "x = 0.05"."""
         level = float(self.point @ self.normal)
-        level = 0.0 if abs(level) < 1e-12 * max(float(np.abs(self.point).max()), 1e-300) else level
+        level = 0.0 if abs(level) < 1e-9 * max(float(np.abs(self.point).max()), 1e-300) else level
         if self.axis is not None:
             sign = self.normal[self.axis]
             return f"{AXES[self.axis]} = {level * sign + 0.0:.6g}"
-        return f"({', '.join(f'{c:.4g}' for c in self.normal)}) . x = {level:.6g}"
+        return f"({', '.join(f'{c:.4g}' for c in np.round(self.normal, 9) + 0.0)}) . x = {level:.6g}"
 
 
 class Scene:
@@ -98,12 +98,11 @@ class Scene:
 
     def _unmatched(self, plane: MirrorPlane, action: Action) -> str:
         held, amount = plane.matrix @ action.held @ plane.matrix, plane.matrix @ action.amount
-        partners = [other for other in self.actions if action.same(other, held, amount)]
-        partners = [other for other in partners if other.shape.corners.shape[1] == action.shape.corners.shape[1]]
+        partners = targets(action, self.actions, held, amount)
         name = " and ".join(action.groups)
         if not partners:
             return f"{action.key}: what it does to {name} has no mirror image"
-        found = [self._off(plane, action.shape, other.shape, f"{action.key}: {name}") for other in partners]
+        found = [self._off(plane, action.shape, shape, f"{action.key}: {name}") for shape in partners]
         return "" if not all(found) else found[0]
 
 

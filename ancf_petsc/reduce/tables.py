@@ -39,8 +39,6 @@ def tables_of(case: Case) -> dict[str, Any]:
     """The tables of a case as read; its groups are groups of the mesh from here on."""
     data = deepcopy(toml.parse(case.text))
     data.pop("groups", None)
-    if isinstance(data.get("material"), dict):
-        data["material"] = [data["material"]]
     return data
 
 
@@ -55,7 +53,8 @@ def halve(smaller: SmallerCase, before: Mesh, plane: MirrorPlane, name: str, sup
     ]
     data["constraint"].append({"group": name, **support})
     _outputs(smaller, before, plane)
-    data["material"] = [row for row in data["material"] if "group" not in row or _left(smaller, row["group"], "")]
+    if isinstance(data["material"], list):
+        data["material"] = [row for row in data["material"] if "group" not in row or _left(smaller, row["group"], "")]
     for key in ("load", "constraint"):
         if not data[key]:
             del data[key]
