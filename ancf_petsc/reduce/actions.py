@@ -118,7 +118,9 @@ def _materials(case: Case, mesh: Mesh) -> list[Action]:
         shape = Shape(mesh.points[sides], np.zeros(len(sides)))
         law = (row.law, row.young, row.poisson, row.density)
         found.append(
-            Action(f"material.{row.group}", "material", shape, np.zeros((3, 3)), np.zeros(3), law, (row.group,))
+            Action(
+                f"material.{row.group}", "material", shape, np.zeros((3, 3)), np.zeros(3), law, (row.group,)
+            )
         )
     return found
 

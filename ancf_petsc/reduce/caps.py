@@ -62,7 +62,11 @@ def _loops(facets: Integers) -> list[Integers]:
     starts, ends = free[order].T
     same = len(np.unique(starts)) == len(starts) and np.array_equal(np.sort(ends), starts)
     if not len(free) or not same:
-        raise CaseError("the cut through the body is no set of closed lines", key="--to", cure="mesh the body in two halves")
+        raise CaseError(
+            "the cut through the body is no set of closed lines",
+            key="--to",
+            cure="mesh the body in two halves",
+        )
     after = np.searchsorted(starts, ends)
     loops, left = [], np.ones(len(starts), bool)
     while left.any():
@@ -79,7 +83,9 @@ def _loops(facets: Integers) -> list[Integers]:
 
 def nested(polygons: Sequence[Floats]) -> list[list[int]]:
     """Which of polygons (k, 2) that do not cross bound a region: its outer one, then those of its holes."""
-    inside = np.array([[i != j and _contains(b, a[0]) for j, b in enumerate(polygons)] for i, a in enumerate(polygons)])
+    inside = np.array(
+        [[i != j and _contains(b, a[0]) for j, b in enumerate(polygons)] for i, a in enumerate(polygons)]
+    )
     depth = inside.sum(axis=1)
     return [
         [i, *(j for j in range(len(polygons)) if depth[j] == depth[i] + 1 and inside[j, i])]
@@ -112,7 +118,9 @@ def fill(points: Floats, facets: Integers, longest: float, volume: float) -> tup
             tags, places, _ = gmsh.model.mesh.getNodes(3, -1)
             _, nodes = gmsh.model.mesh.getElementsByType(KINDS["tetra"].gmsh)
         except Exception as error:
-            raise CaseError(f"Gmsh cannot fill the part that is kept ({error})", key="--to", cure="refine the mesh") from None
+            raise CaseError(
+                f"Gmsh cannot fill the part that is kept ({error})", key="--to", cure="refine the mesh"
+            ) from None
     number = np.zeros(max(int(tags.max(initial=0)), len(points)) + 1, np.int64)
     number[1 : len(points) + 1] = np.arange(len(points))
     number[tags.astype(np.int64)] = len(points) + np.arange(len(tags))
@@ -120,5 +128,7 @@ def fill(points: Floats, facets: Integers, longest: float, volume: float) -> tup
     cells = number[nodes.astype(np.int64)].reshape(-1, 4)
     filled = float(np.abs(part_sizes(everything, cells, KINDS["tetra"])).sum()) if len(cells) else 0.0
     if abs(filled - volume) > FILLED * volume:
-        raise CaseError("Gmsh does not fill the part that is kept", key="--to", cure="mesh the body in two halves")
+        raise CaseError(
+            "Gmsh does not fill the part that is kept", key="--to", cure="mesh the body in two halves"
+        )
     return everything, cells

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ancf_petsc.mesh.groups import boundary_faces
 from ancf_petsc.mesh.kinds import KINDS
-from ancf_petsc.mesh.mesh import Group, Integers, Mesh
+from ancf_petsc.mesh.mesh import Group, Mesh
 from ancf_petsc.mesh.parts import outer_sides, rows_in
 from ancf_petsc.reduce.shape import CLOSE
 from ancf_petsc.reduce.symmetry import MirrorPlane
@@ -37,10 +37,16 @@ def cut(mesh: Mesh, plane: MirrorPlane, name: str) -> Mesh:
     on_plane = (np.abs(plane.heights(mesh.points)) <= slack)[sides].all(axis=1)
     sides = sides[on_plane & (rows_in(sides, boundary_faces(mesh), len(mesh.points)) < 0)]
     part = replace(
-        mesh, cells=cells, cell_numbers=mesh.cell_numbers[kept], used=inside, boundary=None, notes=[], groups={}
+        mesh,
+        cells=cells,
+        cell_numbers=mesh.cell_numbers[kept],
+        used=inside,
+        boundary=None,
+        notes=[],
+        groups={},
     )
     for group in mesh.groups.values():
-        part.groups[group.name] = _part_of(group, inside, kept)
+        part.groups[group.name] = _part_of(group, inside)
     part.groups[name] = Group(name, np.unique(sides), {KINDS[mesh.kind].dimension - 1: sides})
     return part
 
@@ -51,12 +57,8 @@ def _ranges(mesh: Mesh, plane: MirrorPlane) -> tuple[NDArray, NDArray]:
     return heights.min(axis=1), heights.max(axis=1)
 
 
-def _part_of(group: Group, inside: NDArray[np.bool_], kept: NDArray[np.bool_]) -> Group:
-    """What is left of a group where nodes are inside and cells kept."""
+def _part_of(group: Group, inside: NDArray[np.bool_]) -> Group:
+    """What is left of a group where nodes are inside."""
     parts = {d: rows[inside[rows].all(axis=1)] for d, rows in group.parts.items()}
-    cells: Integers | None = None
-    if group.cells is not None:
-        place = np.cumsum(kept) - 1
-        cells = place[group.cells[kept[group.cells]]]
     nodes = group.nodes[inside[group.nodes]]
-    return Group(group.name, nodes, {d: rows for d, rows in parts.items() if len(rows)}, cells)
+    return Group(group.name, nodes, {d: rows for d, rows in parts.items() if len(rows)})

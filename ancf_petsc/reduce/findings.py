@@ -127,7 +127,11 @@ def _revolution(scene: Scene) -> Iterator[Finding]:
     cells = smaller.mesh.cells
     middles = 0 if smaller.data["mesh"]["element"] == LINEAR else 3 * len(cells) // 2
     dof = 2 * (len(smaller.mesh.points) + middles)
-    what = "a body of revolution" if ring.is_whole else f"a sector of {np.degrees(ring.angle):.4g} degrees of a body of revolution"
+    what = (
+        "a body of revolution"
+        if ring.is_whole
+        else f"a sector of {np.degrees(ring.angle):.4g} degrees of a body of revolution"
+    )
     yield Finding(
         "revolution",
         f"{what} about the axis through {place(ring.point)} along {place(ring.axis)}, supports and loads with it: a section of "
@@ -154,7 +158,14 @@ def _of_path(case: Case, at: Mapping[str, float]) -> Iterator[Finding]:
     times = output_times(case.spec, case.file)
     (what, value), curve = next(iter(at.items())), case.spec.output.curve
     if what == "stroke" and curve:
-        row = next((c for c in case.spec.constraint if c.group == curve.stroke.group and curve.stroke.axis in c.move), None)
+        row = next(
+            (
+                c
+                for c in case.spec.constraint
+                if c.group == curve.stroke.group and curve.stroke.axis in c.move
+            ),
+            None,
+        )
         largest = abs(row.move[curve.stroke.axis]) if row else 0.0  # type: ignore[index]
         if row and abs(value) < largest * (1 - 1e-9):
             sign = np.sign(row.move[curve.stroke.axis])  # type: ignore[index]
@@ -184,16 +195,29 @@ def _of_inertia(case: Case, results: Results, within: float) -> Iterator[Finding
     energy = float(np.abs(curve["kinetic_energy"]).max()) / scale if scale else np.inf
     momenta = np.stack([curve[f"momentum.{axis}"] for axis in AXES], axis=1)
     inertial = float(np.linalg.norm(np.gradient(momenta, curve["time"], axis=0), axis=1).max())
-    forces = [np.abs(values).max() for name, values in curve.items() if name.rpartition(".")[2] in ("rx", "ry", "rz")]
+    forces = [
+        np.abs(values).max()
+        for name, values in curve.items()
+        if name.rpartition(".")[2] in ("rx", "ry", "rz")
+    ]
     force = inertial / max(forces) if forces and max(forces) else np.inf
     worst = max(energy, force)
     measured = f"kinetic energy reaches {energy:.2g} of the strain energy and work, inertial forces {force:.2g} of the reactions"
     if worst <= within:
         steps = case.spec.dynamics.outputs
         sentence = f"inertia does not matter: {measured}; statics does"
-        yield Finding("inertia", sentence, f"--set dynamics= 'statics={{ steps = {min(steps, 25)} }}'", 0.0, None, worst)
+        yield Finding(
+            "inertia", sentence, f"--set dynamics= 'statics={{ steps = {min(steps, 25)} }}'", 0.0, None, worst
+        )
     else:
-        yield Finding("inertia", f"inertia matters: {measured}; statics would be off by about as much", "", 1.0, None, worst)
+        yield Finding(
+            "inertia",
+            f"inertia matters: {measured}; statics would be off by about as much",
+            "",
+            1.0,
+            None,
+            worst,
+        )
 
 
 def _of_strain(case: Case, results: Results, within: float) -> Iterator[Finding]:
@@ -208,7 +232,14 @@ def _of_strain(case: Case, results: Results, within: float) -> Iterator[Finding]
     sentence = f"strains and rotations stay below {gradient:.2g}, and force follows stroke in a straight line within {straight:.1g}: one step does"
     count = len(output_times(case.spec, case.file))
     if count > 1:
-        yield Finding("linear", sentence, "--set statics.times= statics.strokes= statics.steps=1", 1.0 / count, None, worst)
+        yield Finding(
+            "linear",
+            sentence,
+            "--set statics.times= statics.strokes= statics.steps=1",
+            1.0 / count,
+            None,
+            worst,
+        )
 
 
 def largest_gradient(results: Results) -> float:

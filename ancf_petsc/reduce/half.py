@@ -6,15 +6,17 @@ import numpy as np
 
 from ancf_petsc.axes import AXES
 from ancf_petsc.errors import CaseError
-from ancf_petsc.mesh.mesh import Mesh
+from ancf_petsc.mesh.kinds import KINDS, qualities
 from ancf_petsc.reduce.cut import crossing_cells, cut
 from ancf_petsc.reduce.remesh import remeshed
 from ancf_petsc.reduce.shape import CLOSE
 from ancf_petsc.reduce.symmetry import MirrorPlane, Scene
-from ancf_petsc.reduce.tables import SmallerCase, halve, tables_of
+from ancf_petsc.reduce.tables import SmallerCase, free_name, halve, tables_and_mesh
 
 HALVES = {f"half-{axis}": i for i, axis in enumerate(AXES)}
 QUARTER = "quarter"
+POOR = 0.1
+"""Mean ratio of an element that is worth a note."""
 
 
 def reduced_by_planes(scene: Scene, to: str) -> SmallerCase:
@@ -35,7 +37,7 @@ def reduced_by_planes(scene: Scene, to: str) -> SmallerCase:
             expected="a plane of symmetry" if wanted == 1 else "two planes of symmetry normal to axes",
             cure="ancf advise lists the planes there are",
         )
-    smaller = SmallerCase(tables_of(scene.case), scene.mesh)
+    smaller = tables_and_mesh(scene.case, scene.mesh)
     _halve(scene, smaller, good[:wanted])
     smaller.data["title"] = f"{smaller.data['title']}, {'half' if wanted == 1 else 'quarter'}"
     return smaller
@@ -58,13 +60,18 @@ def _halve(scene: Scene, smaller: SmallerCase, planes: list[MirrorPlane]) -> Non
     named = [(plane, free_name(scene.mesh, f"symmetry_{AXES[plane.axis or 0]}")) for plane in planes]
     crossed = sum(crossing_cells(scene.mesh, plane) for plane in planes)
     if crossed:
-        smaller.notes.append(f"{crossed} elements lie across the plane: the part is meshed anew from its boundary")
+        smaller.notes.append(
+            f"{crossed} elements lie across the plane: the part is meshed anew from its boundary"
+        )
+    whole = smaller.mesh
     for k, (plane, name) in enumerate(named):
         before = smaller.mesh
-        smaller.mesh = remeshed(scene.mesh, named[: k + 1], scene.case.file) if crossed else cut(before, plane, name)
+        smaller.mesh = (
+            remeshed(whole, named[: k + 1], scene.case.file) if crossed else cut(before, plane, name)
+        )
         halve(smaller, before, plane, name, {"fix": [AXES[plane.axis or 0]]})
-
-
-def free_name(mesh: Mesh, name: str) -> str:
-    """A name that no group has."""
-    return next(word for word in (name, *(f"{name}_{k}" for k in range(2, 10**6))) if word not in mesh.groups)
+    worst = float(qualities(smaller.mesh.points, smaller.mesh.cells, KINDS[smaller.mesh.kind]).min())
+    if crossed and worst < POOR:
+        smaller.notes.append(
+            f"its worst element has a quality of {worst:.2g}: a finer mesh, or one of two halves, gives better ones"
+        )

@@ -35,7 +35,9 @@ def write_mesh(mesh: Mesh, path: Path) -> None:
         for tag, (group, part, *_) in enumerate(rows, start=1):
             file.write(f'{part.dimension} {tag} "{group}"\n')
         file.write(f"$EndPhysicalNames\n$Nodes\n{len(used)}\n")
-        np.savetxt(file, np.column_stack((mesh.node_numbers[used], mesh.points[used])), "%d %.17g %.17g %.17g")
+        np.savetxt(
+            file, np.column_stack((mesh.node_numbers[used], mesh.points[used])), "%d %.17g %.17g %.17g"
+        )
         file.write(f"$EndNodes\n$Elements\n{sum(len(nodes) for *_, nodes in rows)}\n")
         for tag, (_, part, numbers, nodes) in enumerate(rows, start=1):
             if not len(numbers):
@@ -64,17 +66,17 @@ def _entries(mesh: Mesh, group: Group, kind: Kind, cells: Integers) -> list[Entr
     """The parts of a group; a set of nodes stands as what loads and supports take it for, and the nodes left as points."""
     none = np.empty(0, np.int64)
     parts = dict(group.parts)
-    if not parts and group.cells is None:
+    if not parts:
         dimension, rows = parts_for_load(mesh, group)
         parts = {dimension: rows} if dimension else parts_for_support(mesh, group)
-    whole = kind.dimension in parts or group.cells is not None
+    whole = kind.dimension in parts
     parts.pop(kind.dimension, None)
     covered = np.zeros(len(mesh.points), bool)
     for d, rows in parts.items():
         covered[rows] |= d > 0
     if whole:
         own = cells[cells_of(mesh, group)]
-        covered[own] = group.cells is None
+        covered[own] = True
     alone = group.nodes[~covered[group.nodes]]
     corner = np.zeros(len(mesh.points), bool)
     corner[cells[:, : kind.corners]] = True
@@ -82,5 +84,9 @@ def _entries(mesh: Mesh, group: Group, kind: Kind, cells: Integers) -> list[Entr
         alone = alone[corner[alone]]  # other nodes come back with the parts around them
     if len(alone):
         parts[0] = alone[:, None]
-    found = [(group.name, part_kind(d, rows.shape[1]), none, rows) for d, rows in sorted(parts.items()) if len(rows)]
+    found = [
+        (group.name, part_kind(d, rows.shape[1]), none, rows)
+        for d, rows in sorted(parts.items())
+        if len(rows)
+    ]
     return [*found, (group.name, kind, none, own)] if whole and len(own) else found

@@ -34,7 +34,10 @@ def _held_ends(scene: Scene, axis: int, low: float, high: float) -> set[str]:
 
 def _same_along(scene: Scene, axis: int, low: float, high: float) -> bool:
     """Whether body and actions stay what they are when moved along an axis; what leaves the body is mirrored back into it."""
-    if any(kind == "spin" or abs(vector[axis]) > SAME * np.abs(vector).max() for _, vector, kind in directions(scene.case)):
+    if any(
+        kind == "spin" or abs(vector[axis]) > SAME * np.abs(vector).max()
+        for _, vector, kind in directions(scene.case)
+    ):
         return False
     if len(scene.case.spec.material) > 1:
         return False
@@ -55,7 +58,10 @@ def _same_along(scene: Scene, axis: int, low: float, high: float) -> bool:
         return False
     return all(
         _maps(scene, shape, target, axis, low, high)
-        for shape, target in [(mantle, scene.surface.shape), *((a.shape, targets(a, acting, a.held, a.amount)[0]) for a in acting)]
+        for shape, target in [
+            (mantle, scene.surface.shape),
+            *((a.shape, targets(a, acting, a.held, a.amount)[0]) for a in acting),
+        ]
     )
 
 

@@ -68,7 +68,9 @@ class _Cut:
         ends = place.reshape(-1, 3)
         count = (ends >= 0).sum(axis=1)
         whole = np.flatnonzero(count == 2)
-        segments = np.stack([ends[whole].max(axis=1), np.where(ends[whole] >= 0, ends[whole], len(known)).min(axis=1)], axis=1)
+        segments = np.stack(
+            [ends[whole].max(axis=1), np.where(ends[whole] >= 0, ends[whole], len(known)).min(axis=1)], axis=1
+        )
         last = np.flatnonzero(count == 1)
         tips, heights = self._tips(last)
         names, which = np.unique(tips, return_inverse=True)
@@ -106,7 +108,9 @@ class _Cut:
         normal = np.cross(b - a, c - a)
         slope = np.where(np.abs(normal @ self.ring.axis) > 0, normal @ self.ring.axis, 1.0)
         pierced = np.einsum("ki,ki->k", normal, a - self.ring.point) / slope
-        return np.where(has_node, node, len(self.mesh.points) + rows), np.where(has_node, self.height[node], pierced)
+        return np.where(has_node, node, len(self.mesh.points) + rows), np.where(
+            has_node, self.height[node], pierced
+        )
 
     def _along_axis(self, heights: Floats, first: int) -> Integers:
         """Segments on the axis that are in the body: between the first and the second place from below, and so on."""

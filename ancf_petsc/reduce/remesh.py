@@ -30,7 +30,7 @@ def remeshed(mesh: Mesh, planes: Sequence[tuple[MirrorPlane, str]], file: Path |
             cure="mesh the body with an even number of elements across, or with tetrahedra",
         )
     partly = [
-        group.name for group in mesh.groups.values() if 0 < len(group.parts.get(3, ())) < len(mesh.cells) or group.cells is not None
+        group.name for group in mesh.groups.values() if 0 < len(group.parts.get(3, ())) < len(mesh.cells)
     ]
     if partly:
         raise CaseError(
@@ -49,14 +49,20 @@ def remeshed(mesh: Mesh, planes: Sequence[tuple[MirrorPlane, str]], file: Path |
     used = np.unique(cells)
     compact = np.zeros(len(points), np.int64)
     compact[used] = np.arange(len(used))
-    groups = {name: Group(name, np.arange(len(used)), {3: compact[cells]}) for name, g in mesh.groups.items() if 3 in g.parts}
+    groups = {
+        name: Group(name, np.arange(len(used)), {3: compact[cells]})
+        for name, g in mesh.groups.items()
+        if 3 in g.parts
+    }
     for name, inside in skin.faces.items():
         rows = compact[skin.facets[inside]]
         groups[name] = Group(name, np.unique(rows), {2: rows} if len(rows) else {})
     for name, lines in skin.lines.items():
         rows = compact[lines]
         known = groups.get(name, Group(name, rows[:0, 0]))
-        groups[name] = Group(name, np.union1d(known.nodes, rows), {**known.parts, **({1: rows} if len(rows) else {})})
+        groups[name] = Group(
+            name, np.union1d(known.nodes, rows), {**known.parts, **({1: rows} if len(rows) else {})}
+        )
     for name, nodes in skin.nodes.items():
         groups[name] = Group(name, np.unique(compact[nodes]), {0: np.unique(compact[nodes])[:, None]})
     return Mesh(

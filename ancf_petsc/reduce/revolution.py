@@ -69,7 +69,11 @@ def walls_of(scene: Scene) -> list[tuple[Action, MirrorPlane]]:
     found = []
     for action in scene.actions:
         normal = flat_normal(action.shape) if action.kind == "support" else None
-        if normal is not None and not action.amount.any() and np.abs(action.held - np.outer(normal, normal)).max() <= CLOSE:
+        if (
+            normal is not None
+            and not action.amount.any()
+            and np.abs(action.held - np.outer(normal, normal)).max() <= CLOSE
+        ):
             found.append((action, MirrorPlane(action.shape.corners[0, 0], normal)))
     return found
 
@@ -83,10 +87,15 @@ def _candidates(scene: Scene) -> list[Ring]:
             axis = np.cross(one.normal, other.normal)
             if np.linalg.norm(axis) > CLOSE:
                 system = np.array([one.normal, other.normal, axis])
-                point = np.linalg.solve(system, [one.normal @ one.point, other.normal @ other.point, axis @ scene.centre])
+                point = np.linalg.solve(
+                    system, [one.normal @ one.point, other.normal @ other.point, axis @ scene.centre]
+                )
                 found.append((point, axis / np.linalg.norm(axis)))
     for _, plane in walls:
-        found += [(scene.centre - plane.heights(scene.centre[None])[0] * plane.normal, axis) for axis in _directions(scene)]
+        found += [
+            (scene.centre - plane.heights(scene.centre[None])[0] * plane.normal, axis)
+            for axis in _directions(scene)
+        ]
     found += [(scene.centre, axis) for axis in _directions(scene)]
     return [ring for point, axis in found if (ring := _sector(scene, point, axis, walls)) is not None]
 
@@ -96,11 +105,13 @@ def _directions(scene: Scene) -> list[Floats]:
     values, vectors = np.linalg.eigh(scene.inertia)
     odd = 0 if abs(values[2] - values[1]) < abs(values[1] - values[0]) else 2
     own = vectors[:, odd] * np.sign(vectors[np.abs(vectors[:, odd]).argmax(), odd])
-    axes = list(np.eye(3))
+    axes = [np.eye(3)[i] for i in np.argsort(-np.abs(own))]
     return axes if np.abs(own).max() > 1.0 - CLOSE else [own, *axes]
 
 
-def _sector(scene: Scene, point: Floats, axis: Floats, walls: list[tuple[Action, MirrorPlane]]) -> Ring | None:
+def _sector(
+    scene: Scene, point: Floats, axis: Floats, walls: list[tuple[Action, MirrorPlane]]
+) -> Ring | None:
     """The ring about an axis with the planes of symmetry that contain it; None where they are more than two."""
     axis = axis * np.sign(axis[np.abs(axis).argmax()])
     own = [
@@ -143,11 +154,17 @@ def why_no_ring(scene: Scene, ring: Ring) -> str:
     """Why a scene is not one of revolution about an axis; empty if it is."""
     for key, vector, kind in directions(scene.case):
         if kind == "spin" or np.linalg.norm(np.cross(vector, ring.axis)) > SAME * np.linalg.norm(vector):
-            return f"{key}: {place(vector)} is not along the axis" if kind != "spin" else f"{key}: the body rotates"
+            return (
+                f"{key}: {place(vector)} is not along the axis"
+                if kind != "spin"
+                else f"{key}: the body rotates"
+            )
     if len(scene.case.spec.material) > 1:
         return "material: there are several, and sections are made of one"
     acting = [action for action in scene.actions if action.key not in ring.walls]
-    return next((why for action in acting if (why := _differs(ring, action))), "") or _moves(scene, ring, acting)
+    return next((why for action in acting if (why := _differs(ring, action))), "") or _moves(
+        scene, ring, acting
+    )
 
 
 def _differs(ring: Ring, action: Action) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from ancf_petsc.reduce.profile import Profile, profile_of
 from ancf_petsc.reduce.revolution import Ring, ring_of
 from ancf_petsc.reduce.shape import CLOSE, Floats
 from ancf_petsc.reduce.symmetry import Scene
-from ancf_petsc.reduce.tables import SmallerCase, tables_of
+from ancf_petsc.reduce.tables import SmallerCase, tables_and_mesh
 
 STRAIGHT = 0.02
 """Of an edge: points of the section nearer than this to the straight line between others are left out."""
@@ -31,11 +32,15 @@ def reduced_to_section(scene: Scene, size: float | None) -> SmallerCase:
     ring, why = ring_of(scene)
     if ring is None:
         raise CaseError(
-            f"the scene is not one of revolution {why}", file=scene.case.file, key="--to", got="section", cure="ancf advise lists what it is"
+            f"the scene is not one of revolution {why}",
+            file=scene.case.file,
+            key="--to",
+            got="section",
+            cure="ancf advise lists what it is",
         )
     profile = simplified(profile_of(scene, ring))
     radial, axial = axes_of_section(ring)
-    smaller = SmallerCase(tables_of(scene.case), meshed(profile, radial, axial, size))
+    smaller = replace(tables_and_mesh(scene.case, scene.mesh), mesh=meshed(profile, radial, axial, size))
     _fill_tables(smaller, scene, ring, radial, axial)
     return smaller
 
@@ -55,7 +60,11 @@ def simplified(profile: Profile) -> Profile:
         ends[marks] = True
     kept, segments, parents = [], [], []
     for points, own in loops:
-        labels = np.stack([inside[own] for inside in profile.lines.values()], axis=1) if profile.lines else np.zeros((len(own), 0), bool)
+        labels = (
+            np.stack([inside[own] for inside in profile.lines.values()], axis=1)
+            if profile.lines
+            else np.zeros((len(own), 0), bool)
+        )
         fixed = ends[points] | (labels != np.roll(labels, 1, axis=0)).any(axis=1)
         chosen = _corners(profile.points[points], fixed, STRAIGHT * profile.sizes[points])
         first = sum(len(rows) for rows in kept)
@@ -238,15 +247,21 @@ def _outputs(smaller: SmallerCase, ring: Ring, axial: int) -> None:
         for key, direction in curve.items():
             group, _, axis = direction.rpartition(".")
             if group not in groups or abs(ring.axis[AXES.index(axis)]) < 1.0 - CLOSE:
-                smaller.notes.append(f"output.curve.{key}: {direction} is no direction along the axis of a group of the section: left out")
+                smaller.notes.append(
+                    f"output.curve.{key}: {direction} is no direction along the axis of a group of the section: left out"
+                )
                 data["output"].pop("curve", None)
             else:
                 curve[key] = f"{group}.{AXES[axial]}"
     probes = data.pop("probe", [])
     kept = [row for row in probes if row["group"] in groups]
     smaller.notes.extend(
-        f"probe {row['name']}: {row['group']} is none of the section's groups: left out" for row in probes if row not in kept
+        f"probe {row['name']}: {row['group']} is none of the section's groups: left out"
+        for row in probes
+        if row not in kept
     )
-    smaller.notes.extend(f"probe {row['name']}: the mean over the section, of radius and height" for row in kept)
+    smaller.notes.extend(
+        f"probe {row['name']}: the mean over the section, of radius and height" for row in kept
+    )
     if kept:
         data["probe"] = kept

@@ -64,7 +64,9 @@ class Surface:
         self.mesh = mesh
         self.facets = triangles(boundary_faces(mesh))
         self.normals = normals(mesh.points, self.facets)
-        at_nodes = self._at_nodes(self._slack())  # a facet between edges of the body may have no neighbour that says it is curved
+        at_nodes = self._at_nodes(
+            self._slack()
+        )  # a facet between edges of the body may have no neighbour that says it is curved
         self.slack = at_nodes[self.facets].max(axis=1)
 
     @property

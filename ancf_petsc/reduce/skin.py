@@ -179,7 +179,9 @@ def _kept_facets(facets: Integers, heights: Floats, made: tuple[Integers, int]) 
     rows = np.flatnonzero((above == 1) & (below == 1))  # the third corner lies on the plane
     a, b, c = turned(rows, (sign[rows] > 0).argmax(axis=1)).T
     follows = heights[b] < 0
-    point = np.where(follows, _crossing(made, a, np.where(follows, b, a)), _crossing(made, a, np.where(follows, a, c)))
+    point = np.where(
+        follows, _crossing(made, a, np.where(follows, b, a)), _crossing(made, a, np.where(follows, a, c))
+    )
     found.append(np.stack((a, np.where(follows, point, b), np.where(follows, c, point)), axis=1))
     parents.append(rows)
     rows = np.flatnonzero((above == 1) & (below == 2))

@@ -146,10 +146,15 @@ def candidates(scene: Scene) -> list[MirrorPlane]:
     flat = [normal for action in scene.actions if (normal := flat_normal(action.shape)) is not None]
     first = _different([*np.eye(3), *own, *flat])
     between = [
-        sign * b + a for i, a in enumerate(first) for b in first[i + 1 :] if abs(a @ b) < SAME for sign in (1.0, -1.0)
+        sign * b + a
+        for i, a in enumerate(first)
+        for b in first[i + 1 :]
+        if abs(a @ b) < SAME
+        for sign in (1.0, -1.0)
     ]
     return [
-        MirrorPlane(scene.centre, normal) for normal in _different([*first, *(v / np.sqrt(2.0) for v in between)])
+        MirrorPlane(scene.centre, normal)
+        for normal in _different([*first, *(v / np.sqrt(2.0) for v in between)])
     ]
 
 

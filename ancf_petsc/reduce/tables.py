@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,8 @@ import numpy as np
 from ancf_petsc.axes import AXES
 from ancf_petsc.input import toml
 from ancf_petsc.input.load import Case
-from ancf_petsc.mesh.groups import parts_for_load
-from ancf_petsc.mesh.kinds import part_kind, part_sizes
+from ancf_petsc.mesh.groups import cells_of, parts_for_load
+from ancf_petsc.mesh.kinds import KINDS, part_kind, part_sizes
 from ancf_petsc.mesh.mesh import Group, Mesh
 from ancf_petsc.reduce.shape import CLOSE, Floats
 from ancf_petsc.reduce.symmetry import MirrorPlane
@@ -31,15 +31,31 @@ class SmallerCase:
     def text(self, mesh_file: str) -> str:
         """The case as TOML, with its mesh in a file beside it."""
         own = self.data["mesh"]
-        table = {"file": mesh_file, **{name: own[name] for name in ("element", "rule", "duplicates") if name in own}}
+        table = {
+            "file": mesh_file,
+            **{name: own[name] for name in ("element", "rule", "duplicates") if name in own},
+        }
         return toml.write({**self.data, "mesh": table}).rstrip() + "\n"
 
 
-def tables_of(case: Case) -> dict[str, Any]:
-    """The tables of a case as read; its groups are groups of the mesh from here on."""
+def tables_and_mesh(case: Case, mesh: Mesh) -> SmallerCase:
+    """The tables of a case as read, on its own mesh: its groups are groups of the mesh, and elements of materials have their own."""
     data = deepcopy(toml.parse(case.text))
     data.pop("groups", None)
-    return data
+    groups = {name: replace(group, cells=None) for name, group in mesh.groups.items()}
+    dimension = KINDS[mesh.kind].dimension
+    for row in data["material"] if isinstance(data["material"], list) else [data["material"]]:
+        group = mesh.groups.get(row.get("group", ""))
+        if group is not None and (dimension not in group.parts or group.cells is not None):
+            cells = mesh.cells[cells_of(mesh, group), : KINDS[mesh.kind].nodes]
+            row["group"] = free_name(mesh, f"elements of {group.name}")
+            groups[row["group"]] = Group(row["group"], np.unique(cells), {dimension: cells})
+    return SmallerCase(data, replace(mesh, groups=groups))
+
+
+def free_name(mesh: Mesh, name: str) -> str:
+    """A name that no group has."""
+    return next(word for word in (name, *(f"{name}_{k}" for k in range(2, 10**6))) if word not in mesh.groups)
 
 
 def halve(smaller: SmallerCase, before: Mesh, plane: MirrorPlane, name: str, support: dict[str, Any]) -> None:
@@ -49,12 +65,16 @@ def halve(smaller: SmallerCase, before: Mesh, plane: MirrorPlane, name: str, sup
         entry for load in data.get("load", []) for entry in _halved(smaller, before, plane, name, load)
     ]
     data["constraint"] = [
-        row for row in data.get("constraint", []) if _left(smaller, row["group"], f"constraint.{row['group']}")
+        row
+        for row in data.get("constraint", [])
+        if _left(smaller, row["group"], f"constraint.{row['group']}")
     ]
     data["constraint"].append({"group": name, **support})
     _outputs(smaller, before, plane)
     if isinstance(data["material"], list):
-        data["material"] = [row for row in data["material"] if "group" not in row or _left(smaller, row["group"], "")]
+        data["material"] = [
+            row for row in data["material"] if "group" not in row or _left(smaller, row["group"], "")
+        ]
     for key in ("load", "constraint"):
         if not data[key]:
             del data[key]
@@ -132,7 +152,9 @@ def _outputs(smaller: SmallerCase, before: Mesh, plane: MirrorPlane) -> None:
         group, _, axis = curve["force"].rpartition(".")
         divided = _is_divided(before, group, plane, slack)
         if divided and plane.axis == AXES.index(axis):
-            smaller.notes.append(f"output.curve.force: along {axis}, across the plane, forces of both parts cancel in the whole body")
+            smaller.notes.append(
+                f"output.curve.force: along {axis}, across the plane, forces of both parts cancel in the whole body"
+            )
     if divided:
         output["symmetry"] = 2 * output.get("symmetry", 1)
     else:

@@ -40,7 +40,9 @@ def write_case(smaller: SmallerCase, folder: Path) -> tuple[Case, Plan]:
         folder.mkdir(parents=True, exist_ok=True)
     for name in (CASE_FILE, MESH_FILE):
         if (folder / name).exists():
-            raise CaseError(f"{name} is there already", file=folder, key="--out", cure="choose another folder")
+            raise CaseError(
+                f"{name} is there already", file=folder, key="--out", cure="choose another folder"
+            )
     write_mesh(smaller.mesh, folder / MESH_FILE)
     with writing(folder / CASE_FILE, "--out"):
         (folder / CASE_FILE).write_text(smaller.text(MESH_FILE))
