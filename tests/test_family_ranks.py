@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from family import SECTION, cantilever, mesh_of, motion
+from rings import disc
 
 from ancf_petsc import open_results
 
@@ -58,7 +59,13 @@ def cases(folder):
         "3443 in motion": in_motion("3443", "svk", folder, **alpha, mass="lumped"),
         "3813 in motion": in_motion("3813", "svk", folder, **explicit),
         "3-10-1-3 in motion": in_motion("3-10-1-3", "neo_hooke", folder, **alpha, damping=1.0),
+        "2-6-1-2 in motion": in_motion("2-6-1-2", "svk", folder, **alpha),
         "2412 in motion": in_motion("2412", "neo_hooke", folder, **mean),
+        "ring of 2-6-1-2 pressed": disc("2-6-1-2", "neo_hooke", folder),
+        "ring of 2432 pressed": disc("2432", "svk", folder),
+        "ring of 2-6-1-2 in motion": disc("2-6-1-2", "neo_hooke", folder, **mean),
+        "ring of 2412 in motion": disc("2412", "svk", folder, integrator="central_difference", step=0.01),
+        "ring of 2312 in motion": disc("2312", "svk", folder, **alpha, mass="lumped"),
         "2432 in motion": in_motion("2432", "svk", folder, **mean),
         "1222 in motion": in_motion("1222", "svk", folder, **mean),
     }

@@ -78,13 +78,16 @@ def _make_body(case: Case, root: FromRoot[Plan]) -> Body:
     numbering = with_vectors(nodes, first, row.node, row.slot)
     numbering, material, cell_numbers = _sort_cells(root, numbering)
     slots = root.rows(lambda plan: plan.space.slots(), numbering.file_nodes)
+    revolution = root.value(lambda plan: plan.revolution)
     origin = root.value(lambda plan: nearby_origin(plan.space.points, plan.mesh.size))
+    if revolution is not None:
+        origin[revolution.radial] = 0.0  # radii are positions
     reference = root.rows(lambda plan: plan.space.reference(), numbering.file_nodes)
     reference[slots == 0] -= origin
     axes, section = root.value(lambda plan: plan.space.axes), spec.section
     tables = agree(
         comm,
-        lambda: kernel_set(row).cells(
+        lambda: kernel_set(row, axisymmetric=revolution is not None).cells(
             row,
             numbering.cells,
             reference,
@@ -92,6 +95,7 @@ def _make_body(case: Case, root: FromRoot[Plan]) -> Body:
             quadrature=spec.mesh.rule,
             thickness=(section.thickness or section.area or 1.0) if section else 1.0,
             numbers=cell_numbers,
+            **({"revolution": revolution} if revolution else {}),
         ),
     )
     return Body(
@@ -106,6 +110,7 @@ def _make_body(case: Case, root: FromRoot[Plan]) -> Body:
         size=root.value(lambda plan: plan.mesh.size),
         cell_numbers=cell_numbers,
         lumped=spec.dynamics is not None and spec.dynamics.mass == "lumped",
+        revolution=revolution,
     )
 
 

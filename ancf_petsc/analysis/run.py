@@ -102,11 +102,14 @@ def _compile(case: Case, comm: MPI.Comm) -> None:
     laws = [law_named(name) for name in sorted({material.law for material in case.spec.material})]
     row = element(case.spec.mesh.element)
     dynamics = case.spec.dynamics
-    moving = dynamics is not None
-    mean = dynamics is not None and dynamics.method.conserves
-    if comm.rank == 0 and not is_compiled(row, laws, mean=mean, moving=moving):
+    flags = {
+        "mean": dynamics is not None and dynamics.method.conserves,
+        "moving": dynamics is not None,
+        "axisymmetric": case.spec.is_axisymmetric,
+    }
+    if comm.rank == 0 and not is_compiled(row, laws, **flags):
         log.info("compiling kernels (%s): once, under a minute", ", ".join(law.name for law in laws))
-    on_root(comm, lambda: compile_kernels(row, laws, mean=mean, moving=moving))
+    on_root(comm, lambda: compile_kernels(row, laws, **flags))
 
 
 def _solve(

@@ -27,9 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--hexahedra", action="store_true", help="leave the bricks whole")
     parser.add_argument(
         "--flat",
-        choices=("quad", "line"),
+        choices=("triangle", "quad", "line"),
         default="",
-        help="quad: the section half way along y; line: the axis along x",
+        help="triangle, quad: the section half way along y, of a ring in x-z; line: the axis along x",
     )
     parser.add_argument(
         "--order", type=int, default=1, metavar="1|2", help="2: quadratic tetrahedra (default 1)"

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ancf_petsc.studies.runner import Progress
-    from ancf_petsc.studies.table import Outcome
+    from ancf_petsc.studies.runner import StudyProgress
+    from ancf_petsc.studies.table import StudyOutcome
 
 HELP = "run a case with keys varied, and tabulate errors and costs"
 EPILOG = """\
@@ -107,14 +107,14 @@ class _line:
     def __init__(self, *, shown: bool) -> None:
         self.shown, self._width = shown, 0
 
-    def __enter__(self) -> Callable[[Progress], None]:
+    def __enter__(self) -> Callable[[StudyProgress], None]:
         return self._show
 
     def __exit__(self, *_: object) -> None:
         if self.shown and self._width:
             print(f"\r{' ' * self._width}\r", end="", flush=True)
 
-    def _show(self, now: Progress) -> None:
+    def _show(self, now: StudyProgress) -> None:
         if not self.shown:
             return
         left = "" if now.left is None else f", about {_duration(now.left)} left"
@@ -129,7 +129,7 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
-def _report(outcome: Outcome) -> None:
+def _report(outcome: StudyOutcome) -> None:
     """The table in short, the references and the orders."""
     from ancf_petsc.cli.console import show_table
 
@@ -149,7 +149,7 @@ def _report(outcome: Outcome) -> None:
     print(f"table in {outcome.folder / 'study.csv'}; ancf plot {outcome.folder} draws it")
 
 
-def _report_orders(outcome: Outcome) -> None:
+def _report_orders(outcome: StudyOutcome) -> None:
     from ancf_petsc.cli.console import show_table
 
     rows: list[Sequence[object]] = []

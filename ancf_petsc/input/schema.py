@@ -57,7 +57,9 @@ class MeshSpec(Table):
         "three whole numbers >= 1; bricks of `body` along x, y, z, such as [4, 4, 8]", None
     )
     hexahedra: bool = key("true to leave the bricks of `divisions` whole", False)
-    flat: Literal["quad", "line"] | None = key('"quad" or "line"; a section or an axis of `body`', None)
+    flat: Literal["triangle", "quad", "line"] | None = key(
+        'one of "triangle", "quad", "line"; a section or an axis of `body`', None
+    )
     element: str = key(
         'a code of the catalogue, in quotes; such as "3413"', pattern=r"^(\d{4}|\d-\d+-\d-\d)(\+\d+)?$"
     )
@@ -198,7 +200,13 @@ class SectionSpec(Table):
     """[section], for plane elements and beams."""
 
     thickness: float | None = key("a number > 0", None, gt=0)
-    plane: Literal["stress", "strain"] | None = key("a kind of plane state", None)
+    plane: Literal["stress", "strain", "axisymmetric"] | None = key("a kind of plane state", None)
+    axis: Axis | None = key(
+        'an axis "x", "y" or "z" in the plane of the mesh; the axis of revolution, through the origin', None
+    )
+    angle: float | None = key(
+        "a number in (0, 360]; degrees of the ring that forces and energies are of", None, gt=0, le=360
+    )
     area: float | None = key("a number > 0", None, gt=0)
     inertia: float | None = key("a number > 0; the second moment of area", None, gt=0)
 
@@ -224,6 +232,11 @@ class CaseSpec(Table):
         'an option with its value, without the leading dash; such as ksp_type = "cg"', {}
     )
     section: SectionSpec | None = key("a table [section]", None)
+
+    @property
+    def is_axisymmetric(self) -> bool:
+        """Whether the body is one of revolution, of which the mesh is the section."""
+        return self.section is not None and self.section.plane == "axisymmetric"
 
     @model_validator(mode="before")
     @classmethod

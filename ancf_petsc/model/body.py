@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ancf_petsc.element.element import Element
 from ancf_petsc.kernel.interface import Kernels, Span
+from ancf_petsc.kernel.revolution import Revolution
 from ancf_petsc.kernel.tables import map_functions
 from ancf_petsc.material import Law
 from ancf_petsc.parallel.exchange import combined
@@ -54,7 +55,7 @@ class Body:
     j-th slope of its node, which follows the position j places behind. Slopes are multiplied by lengths.
     tables: the cells as every kernel takes them, see `kernel/choice`; they have nodes (e, a) and volumes (e,).
     size: diagonal of the box around the body. cell_numbers: (e,) number of each cell in the mesh file. lumped: whether mass, and
-    what gravity pulls at, are those of a diagonal matrix.
+    what gravity pulls at, are those of a diagonal matrix. revolution: of a body of revolution.
     """
 
     comm: MPI.Comm
@@ -68,6 +69,7 @@ class Body:
     size: float
     cell_numbers: NDArray[np.int64]
     lumped: bool
+    revolution: Revolution | None
 
     @property
     def owned(self) -> int:
@@ -88,6 +90,11 @@ class Body:
     def volumes(self) -> Floats:
         """(e,) undeformed volumes."""
         return self.tables.volumes
+
+    @property
+    def measures(self) -> Floats:
+        """(e, m) coefficients of the undeformed volume per volume of the reference cell: of 1, and of xi where cells are rings."""
+        return self.volumes[:, None] if self.revolution is None else self.tables.measures
 
     @property
     def dof(self) -> int:

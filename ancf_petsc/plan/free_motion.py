@@ -15,20 +15,18 @@ def free_motions(
     pieces: int,
     *,
     slopes: NDArray | None = None,
-    normal: int | None = None,
+    lacking: NDArray[np.bool_] | None = None,
 ) -> dict[int, list[str]]:
     """Names of the free rigid motions of each piece that has some.
 
     vectors (v, 3) undeformed positions and slopes, driven (v, 3) bool, piece (v,) label of each, -1 for those of no cell, slopes
     (v,) bool which are slopes, default none. A motion is free if it moves no driven degree of freedom: the null space of the
     6 x 6 Gram matrix of the motions at the driven degrees of freedom. Rotations are scaled by the size of the piece, slopes to
-    length 1. normal: of a plane body, which has no other motions than those in its plane.
+    length 1. lacking (6,): motions that are no rigid ones of the body, translations before rotations, such as those out of a plane.
     """
     slopes = np.zeros(len(vectors), bool) if slopes is None else slopes
     found = {}
-    others = np.zeros(6)
-    if normal is not None:
-        others[[normal, 3 + (normal + 1) % 3, 3 + (normal + 2) % 3]] = 1.0
+    others = np.zeros(6) if lacking is None else lacking.astype(float)
     for label, gram, centre, size in _gram_matrices(vectors, driven, piece, pieces, slopes):
         values, vectors = np.linalg.eigh(gram + np.diag(others))
         null = vectors[:, values <= 1e-12 * max(np.trace(gram), others.sum(), 1e-300)]

@@ -9,6 +9,7 @@ FROM = 0.45
 INSTEAD = {
     "3413": 'element = "3-10-1-3" on the same mesh',
     "3813": 'element = "3843" where cells are parallelepipeds, else tetrahedra with "3-10-1-3"',
+    "2312": 'element = "2-6-1-2" on the same mesh',
     "2412": 'element = "2432"',
 }
 

@@ -11,7 +11,7 @@ from ancf_petsc.errors import CaseError, did_you_mean
 from ancf_petsc.input.schema import CaseSpec
 from ancf_petsc.model.ramp import make_ramp
 from ancf_petsc.plan.outputs import motion_times, output_times
-from ancf_petsc.studies.spec import At, QuantitySpec
+from ancf_petsc.studies.spec import OutputAt, QuantitySpec
 
 SAME = 1e-9
 """Points of a path closer than this part of the largest are one."""
@@ -107,7 +107,7 @@ def shown(column: str, points: Sequence[float]) -> str:
     return f"its outputs have {column} {', '.join(words)}"
 
 
-def how_to_ask(spec: CaseSpec, at: At) -> str:
+def how_to_ask(spec: CaseSpec, at: OutputAt) -> str:
     """What makes the case write an output there."""
     if spec.dynamics is not None:
         return "choose dynamics.outputs and dynamics.duration so that an interval ends there"

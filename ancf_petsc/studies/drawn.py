@@ -7,7 +7,7 @@ from pathlib import Path
 from ancf_petsc.post.charts.draw import charts_of, save_charts
 from ancf_petsc.post.charts.study_table import read_study
 from ancf_petsc.studies.study import Options, run_study
-from ancf_petsc.studies.table import Outcome
+from ancf_petsc.studies.table import StudyOutcome
 
 
 def study(
@@ -18,7 +18,7 @@ def study(
     ranks: int = 1,
     timing: bool = False,
     draw: bool = True,
-) -> Outcome:
+) -> StudyOutcome:
     """Do what is not done of a study file, write its table and draw its charts; `pandas.DataFrame(outcome.table)` has it.
 
     folder: where it goes, default results/NAME. jobs: runs beside each other, default cores over ranks. timing: repeat

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ancf_petsc.studies.richardson import Extrapolation, Ladder, extrapolate
-from ancf_petsc.studies.rows import Row
+from ancf_petsc.studies.richardson import Ladder, LadderLimit, extrapolate
+from ancf_petsc.studies.rows import RunRow
 from ancf_petsc.studies.spec import QuantitySpec
 
 MESHES = ("mesh.size", "mesh.refine", "mesh.divisions", "mesh.rim", "mesh.file")
@@ -21,7 +21,7 @@ MESH = "mesh"
 
 
 @dataclass(frozen=True)
-class Line:
+class LadderLine:
     """A ladder of one quantity. key: what its levels differ in. values: of the other keys that runs differ in.
 
     rows: finished ones, coarse to fine. sizes: of the levels.
@@ -30,12 +30,12 @@ class Line:
     quantity: str
     key: str
     values: dict[str, Any]
-    rows: list[Row]
+    rows: list[RunRow]
     sizes: list[float]
-    result: Extrapolation
+    result: LadderLimit
 
 
-def ladder_keys(keys: Sequence[str], rows: Sequence[Row]) -> list[str]:
+def ladder_keys(keys: Sequence[str], rows: Sequence[RunRow]) -> list[str]:
     """The keys of a study that make ladders, the most telling first; MESH where mesh keys do so together only."""
     differing = [
         key for key in LADDERS if key in keys and len({_text(row.run.values[key]) for row in rows}) > 1
@@ -47,18 +47,18 @@ def ladder_keys(keys: Sequence[str], rows: Sequence[Row]) -> list[str]:
 
 
 def lines_of(
-    quantity: str, asked: QuantitySpec, key: str, keys: Sequence[str], rows: Sequence[Row]
-) -> list[Line]:
+    quantity: str, asked: QuantitySpec, key: str, keys: Sequence[str], rows: Sequence[RunRow]
+) -> list[LadderLine]:
     """The ladders along a key, one for each combination of the others."""
     together = [name for name in keys if name in MESHES] if key == MESH else [key]
     others = [name for name in keys if name not in together and _differs(name, rows)]
-    groups: dict[str, list[Row]] = {}
+    groups: dict[str, list[RunRow]] = {}
     for row in rows:
         groups.setdefault(_text([row.run.values[name] for name in others]), []).append(row)
     return [_line(quantity, asked, key, others, group) for group in groups.values()]
 
 
-def size_of(row: Row, key: str) -> float:
+def size_of(row: RunRow, key: str) -> float:
     """The size of a level: of elements, of a step, of a tolerance. 0 where there is none."""
     if key in (*MESHES, MESH):
         return row.run.facts.h if row.run.facts else 0.0
@@ -68,7 +68,7 @@ def size_of(row: Row, key: str) -> float:
     return 1.0 / value if key in COUNTS else float(value)
 
 
-def _line(quantity: str, asked: QuantitySpec, key: str, others: list[str], group: list[Row]) -> Line:
+def _line(quantity: str, asked: QuantitySpec, key: str, others: list[str], group: list[RunRow]) -> LadderLine:
     ordered = sorted(group, key=lambda row: -size_of(row, key))
     values = {name: ordered[0].run.values[name] for name in others}
     good = [
@@ -79,14 +79,14 @@ def _line(quantity: str, asked: QuantitySpec, key: str, others: list[str], group
     lost = [row for row in ordered if row.status == "failed" and 0 < size_of(row, key) < finest]
     if lost:
         words = f"finer levels end before it ({lost[0].outcome}): there is no limit to be seen"
-        return Line(quantity, key, values, good, sizes, Extrapolation("not asymptotic", words))
+        return LadderLine(quantity, key, values, good, sizes, LadderLimit("not asymptotic", words))
     result = _extrapolated(quantity, asked, key, good, sizes)
-    return Line(quantity, key, values, good, sizes, result)
+    return LadderLine(quantity, key, values, good, sizes, result)
 
 
 def _extrapolated(
-    quantity: str, asked: QuantitySpec, key: str, rows: list[Row], sizes: list[float]
-) -> Extrapolation:
+    quantity: str, asked: QuantitySpec, key: str, rows: list[RunRow], sizes: list[float]
+) -> LadderLimit:
     values = [row.found[quantity] for row in rows]
     formal = stretches = None
     if key in (*MESHES, MESH):
@@ -98,7 +98,7 @@ def _extrapolated(
     return extrapolate(Ladder(sizes, values, formal, stretches))
 
 
-def _longest(key: str, keys: Sequence[str], rows: Sequence[Row]) -> int:
+def _longest(key: str, keys: Sequence[str], rows: Sequence[RunRow]) -> int:
     """Levels of the longest ladder along a key."""
     groups: dict[str, set[str]] = {}
     for row in rows:
@@ -107,7 +107,7 @@ def _longest(key: str, keys: Sequence[str], rows: Sequence[Row]) -> int:
     return max((len(levels) for levels in groups.values()), default=0)
 
 
-def _differs(key: str, rows: Sequence[Row]) -> bool:
+def _differs(key: str, rows: Sequence[RunRow]) -> bool:
     return len({_text(row.run.values[key]) for row in rows}) > 1
 
 

@@ -100,7 +100,7 @@ def _settings(run: StudyRun) -> list[str]:
     return ["--set", *words] if words else []
 
 
-class Load:
+class OtherLoad:
     """What others take of the machine while a run goes on (Linux): whether the run's cores were its own."""
 
     SPARE = 0.25

@@ -15,7 +15,7 @@ from ancf_petsc.errors import CaseError, did_you_mean
 from ancf_petsc.results.tables import read_table
 from ancf_petsc.studies.columns import SAME, nearest, shown
 from ancf_petsc.studies.ending import summary_of
-from ancf_petsc.studies.spec import At, QuantitySpec
+from ancf_petsc.studies.spec import OutputAt, QuantitySpec
 
 Column = NDArray[np.float64]
 TIMES = ("time", "pseudo_time")
@@ -80,7 +80,7 @@ def value_of(asked: QuantitySpec, tables: Tables, reference: Tables | None = Non
     return _reduced(str(asked.reduce), values, _weights(tables.times, len(values)))
 
 
-def row_of(at: At, tables: Tables) -> int:
+def row_of(at: OutputAt, tables: Tables) -> int:
     """Which output a value is taken at. Raises CaseError where there is none at this place."""
     if at.column == "end":
         return -1

@@ -7,17 +7,26 @@ from dataclasses import dataclass
 
 from ancf_petsc.errors import CaseError
 from ancf_petsc.studies.facts import step_count
-from ancf_petsc.studies.ladders import COUNTS, MESH, MESHES, NUMBERS, Line, ladder_keys, lines_of, size_of
+from ancf_petsc.studies.ladders import (
+    COUNTS,
+    MESH,
+    MESHES,
+    NUMBERS,
+    LadderLine,
+    ladder_keys,
+    lines_of,
+    size_of,
+)
 from ancf_petsc.studies.quantity import Tables, value_of
 from ancf_petsc.studies.read import Study
 from ancf_petsc.studies.richardson import ASYMPTOTIC
-from ancf_petsc.studies.rows import Row
+from ancf_petsc.studies.rows import RunRow
 from ancf_petsc.studies.runs import described, reference_run
-from ancf_petsc.studies.spec import QuantitySpec, Source
+from ancf_petsc.studies.spec import QuantitySpec, ReferenceSource
 
 
 @dataclass(frozen=True)
-class Reference:
+class StudyReference:
     """value None where there is none yet; uncertainty: absolute, None where it is not known. tables: of its series."""
 
     kind: str
@@ -50,7 +59,7 @@ def check_files(study: Study) -> None:
                 _value_in_file(study, name, tables)
 
 
-def series_of(study: Study, name: str, rows: Sequence[Row]) -> Tables | None:
+def series_of(study: Study, name: str, rows: Sequence[RunRow]) -> Tables | None:
     """The tables a quantity's series is compared with, None where they are not there yet."""
     source = study.spec.reference[name]
     if source.kind == "file":
@@ -62,28 +71,32 @@ def series_of(study: Study, name: str, rows: Sequence[Row]) -> Tables | None:
     return finest.tables if finest else None
 
 
-def reference_of(study: Study, name: str, rows: Sequence[Row], lines: Sequence[Line]) -> Reference:
+def reference_of(
+    study: Study, name: str, rows: Sequence[RunRow], lines: Sequence[LadderLine]
+) -> StudyReference:
     """The reference of a quantity from what has run. lines: the quantity's ladders. Raises CaseError for a wrong file."""
     asked, source = study.spec.quantity[name], study.spec.reference[name]
     if asked.against:
-        return Reference(
+        return StudyReference(
             source.kind, 0.0, None, "the series is compared with the reference's: its error is itself"
         )
     if source.kind == "number":
-        return Reference("number", source.value, None, "a number of the study file")
+        return StudyReference("number", source.value, None, "a number of the study file")
     if source.kind == "file":
-        return Reference("file", _value_in_file(study, name, _file(study, name, source)), None, source.file)
+        return StudyReference(
+            "file", _value_in_file(study, name, _file(study, name, source)), None, source.file
+        )
     if source.kind == "run":
         wanted = reference_run(study, name)
         found = next((row.found.get(name) for row in rows if row.run.name == wanted), None)
         words = f"a further run with {described(source.changes)}"
-        return Reference("run", found, None, words if found is not None else f"{words}: no value yet")
+        return StudyReference("run", found, None, words if found is not None else f"{words}: no value yet")
     if source.kind == "finest":
         return _of_finest(name, asked, rows, lines)
     return _of_lines(study.spec.keys, rows, lines, source)
 
 
-def _file(study: Study, name: str, source: Source) -> Tables:
+def _file(study: Study, name: str, source: ReferenceSource) -> Tables:
     path = study.folder / source.file
     if not path.is_file():
         raise CaseError(
@@ -103,7 +116,7 @@ def _value_in_file(study: Study, name: str, tables: Tables) -> float:
         raise CaseError(str(error), file=study.file, key=f"reference.{name}") from None
 
 
-def _finest(rows: Sequence[Row]) -> Row | None:
+def _finest(rows: Sequence[RunRow]) -> RunRow | None:
     """The run with the most degrees of freedom; of those that have as many, the one of the most steps."""
     return max(
         rows,
@@ -115,11 +128,13 @@ def _finest(rows: Sequence[Row]) -> Row | None:
     )
 
 
-def _of_finest(name: str, asked: QuantitySpec, rows: Sequence[Row], lines: Sequence[Line]) -> Reference:
+def _of_finest(
+    name: str, asked: QuantitySpec, rows: Sequence[RunRow], lines: Sequence[LadderLine]
+) -> StudyReference:
     good = [row for row in rows if row.run.in_table and name in row.found and row.counts_for(asked)]
     finest = _finest(good)
     if finest is None:
-        return Reference("finest", None, None, "no run has a value yet")
+        return StudyReference("finest", None, None, "no run has a value yet")
     words = f"the finest run: {described(tuple(finest.run.values.items()))}"
     gaps = [
         (line.result.gap or 0.0) + (line.result.uncertainty or 0.0)
@@ -128,22 +143,24 @@ def _of_finest(name: str, asked: QuantitySpec, rows: Sequence[Row], lines: Seque
     ]
     if not gaps:
         words += "; nothing says how far it is from the limit"
-    return Reference("finest", finest.found[name], max(gaps) if gaps else None, words)
+    return StudyReference("finest", finest.found[name], max(gaps) if gaps else None, words)
 
 
-def _of_lines(keys: Sequence[str], rows: Sequence[Row], lines: Sequence[Line], source: Source) -> Reference:
+def _of_lines(
+    keys: Sequence[str], rows: Sequence[RunRow], lines: Sequence[LadderLine], source: ReferenceSource
+) -> StudyReference:
     """Of all ladders along one key the limit that is least uncertain, checked against the others."""
     table = [row for row in rows if row.run.in_table]
     key = source.key or next(iter(ladder_keys(keys, table)), "")
     if not key:
-        return Reference(
+        return StudyReference(
             "richardson", None, None, "no key of the study makes levels: vary a size, a step or a tolerance"
         )
     ours = _finest_of_others([line for line in lines if line.key == key], key)
     good = [line for line in ours if line.result.verdict == ASYMPTOTIC]
     if not good:
         said = "; ".join(f"{_name(line)}{line.result.verdict}: {line.result.words}" for line in ours)
-        return Reference("richardson", None, None, f"along {key}: {said or 'no levels yet'}")
+        return StudyReference("richardson", None, None, f"along {key}: {said or 'no levels yet'}")
     best = min(good, key=lambda line: line.result.uncertainty or 0.0)
     limit, uncertainty = best.result.limit, best.result.uncertainty
     assert limit is not None
@@ -158,10 +175,10 @@ def _of_lines(keys: Sequence[str], rows: Sequence[Row], lines: Sequence[Line], s
         if line is not best and beyond > 0:
             apart = max(apart, abs(other.limit - limit) - other.uncertainty)
             words += f"; the limit {_name(line)}disagrees: {other.limit:.6g} (+- {other.uncertainty:.2g})"
-    return Reference("richardson", limit, max(uncertainty, apart), words)
+    return StudyReference("richardson", limit, max(uncertainty, apart), words)
 
 
-def _finest_of_others(lines: list[Line], key: str) -> list[Line]:
+def _finest_of_others(lines: list[LadderLine], key: str) -> list[LadderLine]:
     """Of ladders that differ in another key that refines too, those at its finest value: the others have other limits."""
     for other in (*MESHES, *NUMBERS, *COUNTS):
         if not lines or other not in lines[0].values or (key == MESH and other in MESHES):
@@ -173,15 +190,15 @@ def _finest_of_others(lines: list[Line], key: str) -> list[Line]:
     return lines
 
 
-def _name(line: Line) -> str:
+def _name(line: LadderLine) -> str:
     return f"of {described(tuple(line.values.items()))}, " if line.values else ""
 
 
-def all_lines(study: Study, rows: Sequence[Row]) -> dict[str, list[Line]]:
+def all_lines(study: Study, rows: Sequence[RunRow]) -> dict[str, list[LadderLine]]:
     """The ladders of every quantity, along every key that makes some."""
     table = [row for row in rows if row.run.in_table]
     keys = study.spec.keys
-    found: dict[str, list[Line]] = {}
+    found: dict[str, list[LadderLine]] = {}
     for name, asked in study.spec.quantity.items():
         source = study.spec.reference.get(name)
         named = [source.key] if source and source.key else []

@@ -43,7 +43,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Extrapolation:
+class LadderLimit:
     """order, limit and uncertainty (absolute) are None where nothing is claimed. gap: |finest - limit|."""
 
     verdict: str
@@ -68,17 +68,17 @@ class Ladder:
     stretches: Sequence[float] | None = None
 
 
-def extrapolate(ladder: Ladder) -> Extrapolation:
+def extrapolate(ladder: Ladder) -> LadderLimit:
     """Order, limit and uncertainty of a ladder, or why it has none."""
     h, q, stretch = _levels(ladder)
     if len(h) < 3:
-        return Extrapolation(TOO_FEW, f"{len(h)} level{'s' * (len(h) != 1)}; an order needs three")
+        return LadderLimit(TOO_FEW, f"{len(h)} level{'s' * (len(h) != 1)}; an order needs three")
     scale = float(np.abs(q).max())
     steps = np.diff(q)
     if np.abs(steps).max() <= EQUAL * scale:
         noise = float(np.abs(steps).max())
         words = "all levels give the same value: nothing is left to extrapolate"
-        return Extrapolation(ASYMPTOTIC, words, None, float(q[-1]), noise, 0.0)
+        return LadderLimit(ASYMPTOTIC, words, None, float(q[-1]), noise, 0.0)
     if (steps[:-1] * steps[1:] <= 0).any():
         return _refused("values do not change in one direction from level to level")
     triples = [_fitted(h[k : k + 3], q[k : k + 3]) for k in range(len(h) - 2)]
@@ -88,8 +88,8 @@ def extrapolate(ladder: Ladder) -> Extrapolation:
     return _limit(h, q, triples, stretch)
 
 
-def _refused(words: str) -> Extrapolation:
-    return Extrapolation(NOT_ASYMPTOTIC, words)
+def _refused(words: str) -> LadderLimit:
+    return LadderLimit(NOT_ASYMPTOTIC, words)
 
 
 def _levels(ladder: Ladder) -> tuple[Floats, Floats, Floats | None]:
@@ -157,7 +157,7 @@ def _drift(triples: list[tuple[float, float] | None]) -> str:
 
 def _limit(
     h: Floats, q: Floats, triples: list[tuple[float, float] | None], stretch: Floats | None
-) -> Extrapolation:
+) -> LadderLimit:
     """The limit with its uncertainty; of four levels, order and limit by least squares."""
     finest = triples[-1]
     assert finest is not None
@@ -180,7 +180,7 @@ def _limit(
         words = "; a low order, as singular places (re-entrant corners, bonded rims) give it"
     uncertainty = (factor - 1.0) * gap + spread + singular
     levels = f"order {order:.2g} from {len(h)} levels"
-    return Extrapolation(ASYMPTOTIC, f"{levels}{words}", order, float(limit), float(uncertainty), float(gap))
+    return LadderLimit(ASYMPTOTIC, f"{levels}{words}", order, float(limit), float(uncertainty), float(gap))
 
 
 def _least_squares(h: Floats, q: Floats, near: float) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from ancf_petsc.studies.spec import QuantitySpec
 
 
 @dataclass
-class Row:
+class RunRow:
     """A run as it stands. end: None while it has not run. record: what the study noted. found: quantity -> its number."""
 
     run: StudyRun
@@ -72,17 +72,17 @@ class Row:
         return None
 
 
-def read_rows(runs: Sequence[StudyRun], folder: Path) -> list[Row]:
+def read_rows(runs: Sequence[StudyRun], folder: Path) -> list[RunRow]:
     """All runs as their folders have them, in the order given."""
     rows = []
     for run in runs:
         record, place = read_record(folder, run.name), folder / run.name
         end = read_end(place, run.identity, version(), record)
-        rows.append(Row(run, place, end, record, Tables(place)))
+        rows.append(RunRow(run, place, end, record, Tables(place)))
     return rows
 
 
-def fill(row: Row, name: str, asked: QuantitySpec, reference: Tables | None = None) -> None:
+def fill(row: RunRow, name: str, asked: QuantitySpec, reference: Tables | None = None) -> None:
     """Enter one of a row's numbers; where a finished run has none, the row says why."""
     if row.end is None or asked.against and reference is None:
         return

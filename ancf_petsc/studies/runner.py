@@ -18,7 +18,7 @@ from pathlib import Path
 from ancf_petsc.errors import CaseError, Interrupted
 from ancf_petsc.results.mark import refuse_live_run
 from ancf_petsc.studies.ending import RunEnd, one_line, read_end, summary_of
-from ancf_petsc.studies.process import PATIENCE, Load, Process
+from ancf_petsc.studies.process import PATIENCE, OtherLoad, Process
 from ancf_petsc.studies.record import Busy, add_to_record, held, read_record, record_file
 from ancf_petsc.studies.runs import StudyRun, described, version
 
@@ -32,7 +32,7 @@ ANOTHER = "another run is writing into this folder"
 
 
 @dataclass(frozen=True)
-class Progress:
+class StudyProgress:
     """Counts of runs, and seconds left, None while nothing has been measured."""
 
     total: int
@@ -46,7 +46,7 @@ class Progress:
 class _Started:
     process: Process
     lock: ExitStack
-    load: Load
+    load: OtherLoad
     used: float
     alone: bool = True
 
@@ -63,7 +63,7 @@ class Runner:
         ranks: int,
         timeout: float | None = None,
         changed: Callable[[], None] = lambda: None,
-        progress: Callable[[Progress], None] = lambda now: None,
+        progress: Callable[[StudyProgress], None] = lambda now: None,
     ) -> None:
         self.case_file, self.folder, self.jobs, self.ranks = case_file, folder, jobs, ranks
         self.timeout, self.changed, self.progress = timeout, changed, progress
@@ -124,7 +124,7 @@ class Runner:
             facts = {"code": None, "reason": "", "identity": run.identity, "timeout": False}
             sizes = asdict(run.facts) if run.facts else None
             add_to_record(self.folder, run.name, **facts, facts=sizes, changes=described(run.changes))
-            load, used = Load(), _used()
+            load, used = OtherLoad(), _used()
             process = Process(run, self.case_file, self.folder / run.name, self.ranks)
             self._active.append(_Started(process, lock.pop_all(), load, used))
         self.started += 1
@@ -193,7 +193,7 @@ class Runner:
         """One more run in a folder of its own, for its seconds alone."""
         folder = self.folder / f"{run.name}.timing"
         shutil.rmtree(folder, ignore_errors=True)
-        load, used = Load(), _used()
+        load, used = OtherLoad(), _used()
         process = Process(run, self.case_file, folder, self.ranks)
         started = _Started(process, ExitStack(), load, used)
         self._active.append(started)
@@ -216,7 +216,7 @@ class Runner:
             rate = sum(real for _, real in self._spent) / max(sum(guess for guess, _ in self._spent), 1e-9)
             rest = sum(run.seconds for run in self._runs if run.name not in self._ended)
             left = rate * rest / self.jobs
-        self.progress(Progress(len(self._runs), len(ended) - failed, len(self._active), failed, left))
+        self.progress(StudyProgress(len(self._runs), len(ended) - failed, len(self._active), failed, left))
 
     @contextmanager
     def _ending_on_signals(self) -> Iterator[None]:

@@ -29,14 +29,14 @@ RESERVED = (
 """Columns of study.csv that no quantity may take the name of."""
 
 
-class At(NamedTuple):
+class OutputAt(NamedTuple):
     """The output that a value is taken at: the last one ("end"), or where a column has a value."""
 
     column: str
     value: float = 0.0
 
 
-class Source(NamedTuple):
+class ReferenceSource(NamedTuple):
     """What a reference is: kind "richardson", "finest", "number", "file" or "run".
 
     value: of a number. file: of a CSV file. key: what Richardson's levels differ in, "" to be found out.
@@ -54,28 +54,28 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < float("inf")
 
 
-def _at(value: object) -> At:
+def _at(value: object) -> OutputAt:
     if value == END:
-        return At(END)
+        return OutputAt(END)
     if isinstance(value, Mapping) and len(value) == 1:
         ((name, number),) = value.items()
         if name not in ABSCISSAS:
             raise problem("unknown key", got=name, cure=did_you_mean(str(name), ABSCISSAS))
         if _is_number(number):
-            return At(name, float(number))
+            return OutputAt(name, float(number))
     raise problem(
         expected='"end", or one of stroke, time, pseudo_time with a number',
         cure="such as at = { stroke = 0.010 }",
     )
 
 
-def _source(value: object) -> Source:
+def _source(value: object) -> ReferenceSource:
     if _is_number(value):
-        return Source("number", value=float(value))  # type: ignore[arg-type]
+        return ReferenceSource("number", value=float(value))  # type: ignore[arg-type]
     if value in ("richardson", "finest"):
-        return Source(str(value))
+        return ReferenceSource(str(value))
     if isinstance(value, str) and value.lower().endswith(".csv"):
-        return Source("file", file=value)
+        return ReferenceSource("file", file=value)
     if isinstance(value, str):
         raise problem(
             expected='"richardson", "finest", a number, a file.csv or a table of keys',
@@ -83,8 +83,8 @@ def _source(value: object) -> Source:
         )
     if isinstance(value, Mapping) and value:
         if set(value) == {"richardson"} and isinstance(value["richardson"], str):
-            return Source("richardson", key=value["richardson"])
-        return Source("run", changes=tuple(flattened(value)))
+            return ReferenceSource("richardson", key=value["richardson"])
+        return ReferenceSource("run", changes=tuple(flattened(value)))
     raise problem(
         expected='"richardson", "finest", a number, a file.csv or a table of keys', cure='such as "finest"'
     )
@@ -127,8 +127,8 @@ def _free_name(name: str) -> str:
     return name
 
 
-AtKey = Annotated[At, PlainValidator(_at)]
-SourceKey = Annotated[Source, PlainValidator(_source)]
+AtKey = Annotated[OutputAt, PlainValidator(_at)]
+SourceKey = Annotated[ReferenceSource, PlainValidator(_source)]
 Lists = Annotated[dict[Name, Any], AfterValidator(_lists)]
 QuantityName = Annotated[Name, AfterValidator(_free_name)]
 

@@ -15,9 +15,9 @@ from ancf_petsc.material import law_named
 from ancf_petsc.studies.read import Study, load_study
 from ancf_petsc.studies.record import held, read_record
 from ancf_petsc.studies.reference import check_files
-from ancf_petsc.studies.runner import Progress, Runner, free_cores
+from ancf_petsc.studies.runner import Runner, StudyProgress, free_cores
 from ancf_petsc.studies.runs import StudyRun, runs_of
-from ancf_petsc.studies.table import RUNS, Outcome
+from ancf_petsc.studies.table import RUNS, StudyOutcome
 
 log = logging.getLogger("ancf")
 LOCK = "study.lock"
@@ -41,8 +41,8 @@ def run_study(
     path: str | Path | Study,
     folder: str | Path | None = None,
     options: Options | None = None,
-    progress: Callable[[Progress], None] = lambda now: None,
-) -> Outcome:
+    progress: Callable[[StudyProgress], None] = lambda now: None,
+) -> StudyOutcome:
     """Do what is not done of a study and write its table; folder: default results/NAME.
 
     Raises CaseError for a wrong study, Interrupted when the user stops it: its table is written all the same.
@@ -105,10 +105,10 @@ class _Writer:
         if time.monotonic() - self._last > SELDOM:
             self.write()
 
-    def write(self) -> Outcome:
+    def write(self) -> StudyOutcome:
         """Read all folders and write. The lock makes the last writer the one that has seen all."""
         with held(self.folder / LOCK, wait=True):
-            outcome = Outcome(self.study, self.runs, self.folder)
+            outcome = StudyOutcome(self.study, self.runs, self.folder)
             outcome.write()
         self._last = time.monotonic()
         return outcome

@@ -16,12 +16,12 @@ from ancf_petsc.errors import writing
 from ancf_petsc.post.charts.study_table import FACTS, TABLE
 from ancf_petsc.post.units import read_units
 from ancf_petsc.results.folder import write_atomic
-from ancf_petsc.studies.ladders import Line
+from ancf_petsc.studies.ladders import LadderLine
 from ancf_petsc.studies.read import Study
-from ancf_petsc.studies.reference import Reference, all_lines, reference_of, series_of
-from ancf_petsc.studies.rows import Row, fill, read_rows
+from ancf_petsc.studies.reference import StudyReference, all_lines, reference_of, series_of
+from ancf_petsc.studies.rows import RunRow, fill, read_rows
 from ancf_petsc.studies.runs import StudyRun
-from ancf_petsc.studies.spec import At, QuantitySpec
+from ancf_petsc.studies.spec import OutputAt, QuantitySpec
 
 RUNS = "runs"
 SIZES = [
@@ -32,7 +32,7 @@ SIZES = [
 Cells = dict[str, Any]
 
 
-class Outcome:
+class StudyOutcome:
     """A study as its folder has it.
 
     table: column -> cells, one a run, None where there is none; made for `pandas.DataFrame(outcome.table)`.
@@ -100,7 +100,7 @@ class Outcome:
         with writing(self.folder / FACTS):
             write_atomic(self.folder / FACTS, json.dumps(self.facts, indent=1) + "\n")
 
-    def _cells(self, row: Row) -> Cells:
+    def _cells(self, row: RunRow) -> Cells:
         cells: Cells = dict.fromkeys(self.columns)
         cells |= row.run.values
         cells |= {"status": row.status, "outcome": row.outcome, "reason": row.reason}
@@ -108,7 +108,7 @@ class Outcome:
             cells |= self._numbers(row, name, asked)
         return cells | _sizes(row, self.folder)
 
-    def _numbers(self, row: Row, name: str, asked: QuantitySpec) -> Cells:
+    def _numbers(self, row: RunRow, name: str, asked: QuantitySpec) -> Cells:
         """A quantity of a row with its error, where the run came far enough to compare it."""
         found = row.found.get(name)
         reference = self.references.get(name)
@@ -130,8 +130,13 @@ class Outcome:
 
     def _quantity(self, name: str, asked: QuantitySpec) -> Cells:
         reference = self.references.get(name)
-        said: Cells = {"column": asked.column, "summary": asked.summary, "reduce": asked.reduce}
-        if isinstance(asked.at, At):
+        said: Cells = {
+            "column": asked.column,
+            "summary": asked.summary,
+            "reduce": asked.reduce,
+            "against": asked.against,
+        }
+        if isinstance(asked.at, OutputAt):
             said["at"] = "end" if asked.at.column == "end" else {asked.at.column: asked.at.value}
         said["unit"] = "" if asked.against else unit_of(asked.column or "", self.study.base.spec.units)
         said["reference"] = None if reference is None else _said(reference)
@@ -151,7 +156,7 @@ def _ordered(study: Study, runs: Sequence[StudyRun]) -> list[StudyRun]:
     )
 
 
-def _said(reference: Reference) -> Cells:
+def _said(reference: StudyReference) -> Cells:
     return {
         "kind": reference.kind,
         "value": reference.value,
@@ -160,7 +165,7 @@ def _said(reference: Reference) -> Cells:
     }
 
 
-def _order(line: Line) -> Cells:
+def _order(line: LadderLine) -> Cells:
     result = line.result
     relative = None
     if result.uncertainty is not None and result.limit is not None:
@@ -177,7 +182,7 @@ def _order(line: Line) -> Cells:
     }
 
 
-def _sizes(row: Row, folder: Path) -> Cells:
+def _sizes(row: RunRow, folder: Path) -> Cells:
     """What the run took; seconds of the run that was repeated alone, where there was one."""
     summary = row.end.summary if row.end else {}
     seconds = row.record.get("seconds") or summary.get("seconds") or {}

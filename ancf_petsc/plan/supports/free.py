@@ -19,7 +19,7 @@ def refuse_free_motions(part: Part, table: SupportTable) -> None:
     space = part.space
     pieces, label = connected_pieces(space.cells, len(space.nodes))
     driven, nodes, slopes = table.drive >= 0, space.node_of(), space.slots() > 0
-    free = free_motions(space.reference(), driven, label[nodes], pieces, slopes=slopes, normal=part.normal)
+    free = free_motions(space.reference(), driven, label[nodes], pieces, slopes=slopes, lacking=part.lacking)
     if not free:
         _refuse_joints(part, driven, pieces)
         return
@@ -52,7 +52,7 @@ def _refuse_joints(part: Part, driven: NDArray, pieces: int) -> None:
     vectors = np.repeat(space.first[node] - np.cumsum(sizes) + sizes, sizes) + np.arange(sizes.sum())
     belongs = np.stack([vectors, np.repeat(own, sizes)], axis=1)
     found = free_joints(
-        space.reference(), driven, belongs, count, slopes=space.slots() > 0, normal=part.normal
+        space.reference(), driven, belongs, count, slopes=space.slots() > 0, lacking=part.lacking
     )
     if found is None:
         return

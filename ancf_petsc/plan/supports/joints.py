@@ -20,13 +20,13 @@ def free_joints(
     pieces: int,
     *,
     slopes: NDArray,
-    normal: int | None = None,
+    lacking: NDArray | None = None,
 ) -> tuple[int, list[str]] | None:
     """The piece that can move most though joints and supports hold it, and the names of its motions; None where none can.
 
     vectors (v, 3) undeformed positions and slopes, driven (v, 3) bool, slopes (v,) bool which are slopes.
     belongs (m, 2): vector and piece, each pair once; a vector of several pieces joins them: it moves with all.
-    normal: of a plane body, which has no other motions than those in its plane.
+    lacking (6,): as `free_motions` has it.
     """
     if pieces > MOST_PIECES:
         return None
@@ -46,9 +46,8 @@ def free_joints(
     gram = np.zeros((6 * pieces, 6 * pieces))
     _add_supports(gram, modes[first], driven[vector[first]], piece[first])
     _add_joints(gram, modes, piece, first)
-    if normal is not None:
-        others = [normal, 3 + (normal + 1) % 3, 3 + (normal + 2) % 3]
-        rows = (6 * np.arange(pieces)[:, None] + others).ravel()
+    if lacking is not None:
+        rows = (6 * np.arange(pieces)[:, None] + np.flatnonzero(lacking)).ravel()
         gram[rows, rows] += 1.0
     values, motions = np.linalg.eigh(gram)
     null = motions[:, values <= NULL * max(values[-1], 1e-300)].reshape(pieces, 6, -1)

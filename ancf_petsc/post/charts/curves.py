@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from ancf_petsc.errors import CaseError, did_you_mean
 from ancf_petsc.post.charts.marks import (
-    Look,
+    LineLook,
     draw_predicted,
     end_labels,
     finish_chart,
@@ -16,7 +16,7 @@ from ancf_petsc.post.charts.marks import (
     looks,
     write_labels,
 )
-from ancf_petsc.post.charts.points import Line, Panel, Point, grouped, panel_rows
+from ancf_petsc.post.charts.points import ChartLine, ChartPanel, ChartPoint, grouped, panel_rows
 from ancf_petsc.post.charts.predicted import predicted_lines
 from ancf_petsc.post.charts.spec import ChartSpec
 from ancf_petsc.post.charts.study_table import StudyRow, StudyTable
@@ -28,7 +28,7 @@ ABSCISSAS = ("time", "pseudo_time")
 Columns = dict[str, np.ndarray]
 
 
-def curve_panels(study: StudyTable, chart: ChartSpec) -> list[Panel]:
+def curve_panels(study: StudyTable, chart: ChartSpec) -> list[ChartPanel]:
     """A panel for each column and value of `panels`; a line for each run."""
     panels = []
     for value, rows in panel_rows(study, chart).items():
@@ -47,7 +47,7 @@ def curve_panels(study: StudyTable, chart: ChartSpec) -> list[Panel]:
             if chart.relative:
                 y = f"{y.partition(' [')[0]} / its start"
             title = value_words(chart, str(chart.panels), value) if chart.panels else ""
-            panel = Panel(
+            panel = ChartPanel(
                 title, chart.x_label or x, chart.y_label if chart.y_label and len(chart.y) == 1 else y, lines
             )
             panel.predicted = predicted_lines(study, chart, rows, value)
@@ -67,17 +67,19 @@ def _table(study: StudyTable, row: StudyRow) -> Columns:
 
 def _line(
     study: StudyTable, row: StudyRow, label: str, table: Columns, columns: tuple[str, str], *, relative: bool
-) -> Line:
+) -> ChartLine:
     x, y = (_column(study, row, table, name) for name in columns)
     if relative and len(y) and y[0]:
         y = y / y[0]
     count = min(len(x), len(y))
     points = [
-        Point(float(a), float(b), run=row.text("run")) for a, b in zip(x[:count], y[:count], strict=True)
+        ChartPoint(float(a), float(b), run=row.text("run")) for a, b in zip(x[:count], y[:count], strict=True)
     ]
     if points and not row.ended:
-        points[-1] = Point(points[-1].x, points[-1].y, ended=False, outcome=row.outcome, run=row.text("run"))
-    return Line(label, points)
+        points[-1] = ChartPoint(
+            points[-1].x, points[-1].y, ended=False, outcome=row.outcome, run=row.text("run")
+        )
+    return ChartLine(label, points)
 
 
 def _column(study: StudyTable, row: StudyRow, table: Columns, name: str) -> np.ndarray:
@@ -96,7 +98,7 @@ def _column(study: StudyTable, row: StudyRow, table: Columns, name: str) -> np.n
     return total
 
 
-def draw_curves(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> Figure:
+def draw_curves(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -> Figure:
     """Runs over time, pseudo-time or stroke; a cross where one ended before its end."""
     look = looks(line.label for panel in panels for line in panel.lines)
     kinds = {label: LINES[k % len(LINES)] for k, label in enumerate(look)}
@@ -121,7 +123,7 @@ def draw_curves(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> Fig
     return figure
 
 
-def _draw_curve(axes: Axes, line: Line, look: Look, kind: object) -> None:
+def _draw_curve(axes: Axes, line: ChartLine, look: LineLook, kind: object) -> None:
     """In the order of the run: a path may go back. A few marks tell lines apart without colour."""
     points = [p for p in line.points if p.known]
     every = max(1, len(points) // 8)
@@ -135,7 +137,7 @@ def _draw_curve(axes: Axes, line: Line, look: Look, kind: object) -> None:
         )
 
 
-def _ends(panels: list[Panel]) -> str:
+def _ends(panels: list[ChartPanel]) -> str:
     ended = dict.fromkeys(
         f"{line.label}: {outcome_words(p.outcome)}"
         for panel in panels

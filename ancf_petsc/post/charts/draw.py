@@ -18,7 +18,7 @@ from ancf_petsc.post.charts.errors import (
     precision_panels,
 )
 from ancf_petsc.post.charts.maps import draw_map, map_panels, map_records
-from ancf_petsc.post.charts.points import Panel
+from ancf_petsc.post.charts.points import ChartPanel
 from ancf_petsc.post.charts.profile import draw_profile, profile_panels
 from ancf_petsc.post.charts.spec import ChartSpec
 from ancf_petsc.post.charts.study_table import StudyTable
@@ -28,14 +28,14 @@ from ancf_petsc.post.figures import file_name, save
 Record = dict[str, Any]
 
 
-class Maker(NamedTuple):
+class ChartMaker(NamedTuple):
     """panels: what is drawn, none where there is too little; draw: the picture."""
 
-    panels: Callable[[StudyTable, ChartSpec], list[Panel]]
-    draw: Callable[[StudyTable, ChartSpec, list[Panel]], Figure]
+    panels: Callable[[StudyTable, ChartSpec], list[ChartPanel]]
+    draw: Callable[[StudyTable, ChartSpec, list[ChartPanel]], Figure]
 
 
-class Chart(NamedTuple):
+class DrawnChart(NamedTuple):
     """A picture and its numbers, one record a point."""
 
     name: str
@@ -44,12 +44,12 @@ class Chart(NamedTuple):
 
 
 MAKERS = {
-    "work_precision": Maker(precision_panels, draw_precision),
-    "convergence": Maker(convergence_panels, draw_convergence),
-    "map": Maker(map_panels, draw_map),
-    "values": Maker(value_panels, draw_values),
-    "curves": Maker(curve_panels, draw_curves),
-    "profile": Maker(
+    "work_precision": ChartMaker(precision_panels, draw_precision),
+    "convergence": ChartMaker(convergence_panels, draw_convergence),
+    "map": ChartMaker(map_panels, draw_map),
+    "values": ChartMaker(value_panels, draw_values),
+    "curves": ChartMaker(curve_panels, draw_curves),
+    "profile": ChartMaker(
         lambda study, chart: profile_panels([study], chart),
         lambda study, chart, panels: draw_profile([study], chart, panels),
     ),
@@ -69,7 +69,7 @@ def charts_wanted(study: StudyTable) -> list[ChartSpec]:
     ]
 
 
-def charts_of(study: StudyTable) -> tuple[list[Chart], list[str]]:
+def charts_of(study: StudyTable) -> tuple[list[DrawnChart], list[str]]:
     """The charts of a study, and the names of those with too few points to draw."""
     drawn, empty = [], []
     for chart in charts_wanted(study):
@@ -79,22 +79,22 @@ def charts_of(study: StudyTable) -> tuple[list[Chart], list[str]]:
             empty.append(chart.file_name)
             continue
         records = map_records(study, chart, panels) if chart.kind == "map" else records_of(panels)
-        drawn.append(Chart(chart.file_name, maker.draw(study, chart, panels), records))
+        drawn.append(DrawnChart(chart.file_name, maker.draw(study, chart, panels), records))
     return drawn, empty
 
 
-def profile_of(studies: Sequence[StudyTable]) -> Chart | None:
+def profile_of(studies: Sequence[StudyTable]) -> DrawnChart | None:
     """The profile over several studies; None where they have no errors to compare."""
     chart = ChartSpec(kind="profile")
     panels = profile_panels(studies, chart)
-    return Chart("profile", draw_profile(studies, chart, panels), records_of(panels)) if panels else None
+    return DrawnChart("profile", draw_profile(studies, chart, panels), records_of(panels)) if panels else None
 
 
-def records_of(panels: Iterable[Panel]) -> list[Record]:
+def records_of(panels: Iterable[ChartPanel]) -> list[Record]:
     return [record for panel in panels for record in panel.records()]
 
 
-def save_charts(charts: Sequence[Chart], folder: Path, suffixes: Sequence[str]) -> list[Path]:
+def save_charts(charts: Sequence[DrawnChart], folder: Path, suffixes: Sequence[str]) -> list[Path]:
     """Write the pictures of each and NAME.csv; the files written. Raises CaseError where two have one name."""
     names = [file_name(chart.name) for chart in charts]
     twice = next((name for name in names if names.count(name) > 1), None)

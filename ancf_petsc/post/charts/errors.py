@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ancf_petsc.post.charts.marks import (
-    Label,
-    Look,
+    EndLabel,
+    LineLook,
     draw_bars,
     draw_margin,
     draw_points,
@@ -21,7 +21,7 @@ from ancf_petsc.post.charts.marks import (
     plain_ticks,
     write_labels,
 )
-from ancf_petsc.post.charts.points import NAN, Line, Panel, Point, grouped, line_keys, pareto
+from ancf_petsc.post.charts.points import NAN, ChartLine, ChartPanel, ChartPoint, grouped, pareto
 from ancf_petsc.post.charts.spec import ChartSpec
 from ancf_petsc.post.charts.study_table import StudyRow, StudyTable, same, select
 from ancf_petsc.post.charts.words import axis_words, title_of
@@ -32,35 +32,35 @@ COSTS = {"seconds": ("total_seconds", "seconds of the whole run"), "dof": ("dof"
 HOLLOW = "Hollow: seconds of a run that shared the machine's cores with others."
 
 
-def error_point(row: StudyRow, quantity: str, x: float, *, alone: bool = True) -> Point:
+def error_point(row: StudyRow, quantity: str, x: float, *, alone: bool = True) -> ChartPoint:
     """Of one run; a run that ended before its end has no error."""
     error, uncertainty = row.number(f"{quantity}_error"), row.number(f"{quantity}_uncertainty")
     y = error if row.ended and error > 0 else NAN
     low, high = (y - uncertainty, y + uncertainty) if uncertainty > 0 else (NAN, NAN)
-    return Point(x, y, low, high, row.ended, alone, row.outcome, run=row.text("run"))
+    return ChartPoint(x, y, low, high, row.ended, alone, row.outcome, run=row.text("run"))
 
 
-def precision_panels(study: StudyTable, chart: ChartSpec) -> list[Panel]:
+def precision_panels(study: StudyTable, chart: ChartSpec) -> list[ChartPanel]:
     """Error over each cost, one line a group; the front of what none beats is marked `best`."""
     quantity, panels = str(chart.quantity), []
     for cost in chart.cost:
         column, words = COSTS[cost]
-        panel = Panel("", words, _error_words(study, chart))
+        panel = ChartPanel("", words, _error_words(study, chart))
         for label, rows in grouped(study, select(study, chart.only), chart).items():
             points = [
                 error_point(row, quantity, row.number(column), alone=cost != "seconds" or row.alone)
                 for row in rows
             ]
-            panel.lines.append(Line(label, points))
+            panel.lines.append(ChartLine(label, points))
         pareto(panel.lines)
         panels.append(panel)
     return [panel for panel in panels if panel.count > 1]
 
 
-def draw_precision(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> Figure:
+def draw_precision(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -> Figure:
     """Error against seconds and against degrees of freedom."""
     look = looks(line.label for line in panels[0].lines)
-    failed: list[Point] = []
+    failed: list[ChartPoint] = []
     with style():
         figure, places = grid_of_panels(len(panels))
         labels = []
@@ -85,7 +85,9 @@ def draw_precision(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> 
     return figure
 
 
-def _draw_errors(axes: Axes, panel: Panel, look: dict[str, Look], *, relative: bool) -> list[Point]:
+def _draw_errors(
+    axes: Axes, panel: ChartPanel, look: dict[str, LineLook], *, relative: bool
+) -> list[ChartPoint]:
     """Lines, bars and failed runs of a panel on logarithmic axes; the failed runs."""
     axes.set(xscale="log", yscale="log", xlabel=panel.x, ylabel=panel.y)
     for line in panel.lines:
@@ -99,7 +101,7 @@ def _draw_errors(axes: Axes, panel: Panel, look: dict[str, Look], *, relative: b
     return draw_margin(axes, panel.lines, look)
 
 
-def _draw_front(axes: Axes, front: list[Point]) -> None:
+def _draw_front(axes: Axes, front: list[ChartPoint]) -> None:
     """A broad band under the points that none beats, cheaper and more accurate at once."""
     axes.plot(
         [p.x for p in front], [p.y for p in front], color="#d9d9d9", linewidth=9, solid_capstyle="round",
@@ -107,7 +109,7 @@ def _draw_front(axes: Axes, front: list[Point]) -> None:
     )  # fmt: skip
 
 
-def _front_words(panels: list[Panel]) -> str:
+def _front_words(panels: list[ChartPanel]) -> str:
     return "Grey band: no run is cheaper and more accurate at once (Pareto front)." if panels else ""
 
 
@@ -116,15 +118,16 @@ def reference_words(study: StudyTable, chart: ChartSpec) -> str:
     reference = study.reference(str(chart.quantity))
     words = str(reference.get("words") or "")
     value, unit = reference.get("value"), study.quantities.get(str(chart.quantity), {}).get("unit") or ""
-    if isinstance(value, int | float):
+    if isinstance(value, int | float) and value:
         said = f"{value:.6g} {unit}".strip()
         words = f"{said} ({words})" if words else said
     return f"Errors are against {words}." if words else ""
 
 
 def is_relative(study: StudyTable, chart: ChartSpec) -> bool:
-    """Whether errors are parts of the reference; against 0 they are absolute."""
-    return study.reference(str(chart.quantity)).get("value") != 0
+    """Whether errors are parts of the reference; against the number 0 they are absolute."""
+    facts = study.quantities.get(str(chart.quantity), {})
+    return bool(facts.get("against")) or study.reference(str(chart.quantity)).get("value") != 0
 
 
 def _error_words(study: StudyTable, chart: ChartSpec) -> str:
@@ -137,12 +140,12 @@ def _name(chart: ChartSpec) -> str:
     return chart.labels.get(str(chart.quantity), str(chart.quantity).replace("_", " "))
 
 
-def convergence_panels(study: StudyTable, chart: ChartSpec) -> list[Panel]:
+def convergence_panels(study: StudyTable, chart: ChartSpec) -> list[ChartPanel]:
     """Error over the size of elements, steps or tolerances."""
     x = chart.x or _abscissa(study)
-    panel = Panel("", axis_words(study, chart, x), _error_words(study, chart))
+    panel = ChartPanel("", axis_words(study, chart, x), _error_words(study, chart))
     for label, rows in grouped(study, select(study, chart.only), chart).items():
-        line = Line(label, [error_point(row, str(chart.quantity), row.number(x)) for row in rows])
+        line = ChartLine(label, [error_point(row, str(chart.quantity), row.number(x)) for row in rows])
         line.more = order_words(study, chart, rows, line)
         panel.lines.append(line)
     return [panel] if panel.count > 1 else []
@@ -154,14 +157,12 @@ def _abscissa(study: StudyTable) -> str:
     return next((key for key in refining if len(study.keys.get(key, ())) > 1 and study.is_numeric(key)), "h")
 
 
-def order_words(study: StudyTable, chart: ChartSpec, rows: list[StudyRow], line: Line) -> str:
+def order_words(study: StudyTable, chart: ChartSpec, rows: list[StudyRow], line: ChartLine) -> str:
     """The order that the study has fitted to the line, else the slope of its finest three errors."""
-    keys = line_keys(study, chart)
     for order in study.orders:
-        fits = order.get("quantity") == chart.quantity and order.get("line", {}).keys() <= set(keys)
-        if not (
-            fits and rows and all(same(rows[0].text(key), value) for key, value in order["line"].items())
-        ):
+        known = {key: value for key, value in order.get("line", {}).items() if value is not None}
+        fits = order.get("quantity") == chart.quantity and rows
+        if not (fits and all(same(row.text(key), value) for row in rows for key, value in known.items())):
             continue
         if order.get("verdict") == "asymptotic" and isinstance(order.get("order"), int | float):
             return f"order {order['order']:.1f}"
@@ -170,7 +171,7 @@ def order_words(study: StudyTable, chart: ChartSpec, rows: list[StudyRow], line:
     return f"slope {slope:.1f}" if slope == slope else ""
 
 
-def slope_of(points: list[Point]) -> float:
+def slope_of(points: list[ChartPoint]) -> float:
     """Of the logarithms of the three points of smallest x, by least squares; nan of fewer."""
     finest = points[:3]
     if len(finest) < 3 or any(p.x <= 0 or p.y <= 0 for p in finest) or len({p.x for p in finest}) < 3:
@@ -178,7 +179,7 @@ def slope_of(points: list[Point]) -> float:
     return float(np.polyfit(np.log([p.x for p in finest]), np.log([p.y for p in finest]), 1)[0])
 
 
-def draw_convergence(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> Figure:
+def draw_convergence(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -> Figure:
     """Error against size, step or tolerance; orders stand beside the lines."""
     look = looks(line.label for line in panels[0].lines)
     with style():
@@ -187,6 +188,6 @@ def draw_convergence(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -
         finish_chart(
             figure, title_of(study, chart), (chart.note, reference_words(study, chart), failure_words(failed))
         )
-        labels: list[Label] = end_labels(panels[0].lines, look)
+        labels: list[EndLabel] = end_labels(panels[0].lines, look)
         write_labels(figure, [(axes, labels)])
     return figure

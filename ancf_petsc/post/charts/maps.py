@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from ancf_petsc.post.charts.marks import (
-    Label,
+    EndLabel,
     draw_predicted,
     finish_chart,
     grid_of_panels,
     swatch,
     write_labels,
 )
-from ancf_petsc.post.charts.points import Line, Panel, Point, panel_rows
+from ancf_petsc.post.charts.points import ChartLine, ChartPanel, ChartPoint, panel_rows
 from ancf_petsc.post.charts.predicted import predicted_lines
 from ancf_petsc.post.charts.spec import ChartSpec
 from ancf_petsc.post.charts.study_table import StudyRow, StudyTable
@@ -34,7 +34,7 @@ COLOURS = {
     "material_limit": ("#0072B2", "p"),
     "inverted_element": ("#8c6d46", "<"),
     "step_too_long": ("#D55E00", ">"),
-    "diverged": ("#D55E00", "X"),
+    "diverged": ("#444444", "X"),
 }
 """Outcome -> colour of its cells and the mark in them. Others are grey crosses."""
 OTHER = ("#999999", "x")
@@ -42,22 +42,23 @@ SHOWN_NUMBERS = 80
 """Maps of more cells show marks without numbers."""
 
 
-def map_panels(study: StudyTable, chart: ChartSpec) -> list[Panel]:
+def map_panels(study: StudyTable, chart: ChartSpec) -> list[ChartPanel]:
     """One panel a value of `panels`; its lines are outcomes, its points cells at the numbers of their values."""
     panels = []
     x, y = str(chart.x), chart.y[0]
     for value, rows in panel_rows(study, chart).items():
         title = value_words(chart, str(chart.panels), value) if chart.panels else ""
-        panel = Panel(title, axis_words(study, chart, x), axis_words(study, chart, y))
-        found: dict[str, list[Point]] = {}
+        words = (chart.x_label or axis_words(study, chart, x), chart.y_label or axis_words(study, chart, y))
+        panel = ChartPanel(title, *words)
+        found: dict[str, list[ChartPoint]] = {}
         for row in rows:
             outcome = outcome_of(row, chart)
             place = (study.values(x).index(row.text(x)), study.values(y).index(row.text(y)))
             number = row.number(chart.quantity) if chart.quantity else float("nan")
             found.setdefault(outcome, []).append(
-                Point(*place, low=number, ended=row.ended, outcome=outcome, run=row.text("run"))
+                ChartPoint(*place, low=number, ended=row.ended, outcome=outcome, run=row.text("run"))
             )
-        panel.lines = [Line(outcome_words(outcome), points) for outcome, points in found.items()]
+        panel.lines = [ChartLine(outcome_words(outcome), points) for outcome, points in found.items()]
         panel.predicted = predicted_lines(study, chart, rows, value)
         panels.append(panel)
     return [panel for panel in panels if panel.count > 1]
@@ -69,7 +70,7 @@ def outcome_of(row: StudyRow, chart: ChartSpec) -> str:
     return "energy_grown" if grown and row.ended else "reached" if row.outcome == "done" else row.outcome
 
 
-def map_records(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> list[dict[str, object]]:
+def map_records(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -> list[dict[str, object]]:
     """Rows of the chart's CSV: values of both axes, not their places."""
     x, y = study.values(str(chart.x)), study.values(chart.y[0])
     rows: list[dict[str, object]] = []
@@ -92,7 +93,7 @@ def map_records(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> lis
     return rows
 
 
-def draw_map(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> Figure:
+def draw_map(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -> Figure:
     """Coloured cells with a mark each; the legend stands beside the panels."""
     x, y = study.values(str(chart.x)), study.values(chart.y[0])
     wide, high = (max(2.4, 0.62 * len(values) + 1.2) for values in (x, y))
@@ -101,30 +102,37 @@ def draw_map(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> Figure
         *(name for name in COLOURS if name in outcomes),
         *(name for name in outcomes if name not in COLOURS),
     ]
+    numbers = bool(chart.quantity) and len(x) * len(y) <= SHOWN_NUMBERS
     with style():
         figure, places = grid_of_panels(len(panels), wide=min(wide, 5.5), high=min(high, 5.0))
-        labels: list[tuple[Axes, Sequence[Label]]] = []
+        labels: list[tuple[Axes, Sequence[EndLabel]]] = []
         for axes, panel in zip(places, panels, strict=True):
-            _draw_cells(axes, panel, numbers=bool(chart.quantity) and len(x) * len(y) <= SHOWN_NUMBERS)
+            _draw_cells(axes, panel, numbers=numbers)
             _name_axes(axes, panel, [[value_words(chart, key, v) for v in values] for key, values in
                                      ((str(chart.x), x), (chart.y[0], y))])  # fmt: skip
-            scaled = Panel(panel.title, panel.x, panel.y, predicted=_on_cells(study, chart, panel.predicted))
+            scaled = ChartPanel(
+                panel.title, panel.x, panel.y, predicted=_on_cells(study, chart, panel.predicted)
+            )
             labels.append((axes, draw_predicted(axes, scaled)))
         handles = [swatch(*COLOURS.get(name, OTHER), outcome_words(name)) for name in outcomes]
         figure.legend(handles=handles, loc="outside right upper")
-        finish_chart(figure, title_of(study, chart), (chart.note, _quantity_words(study, chart)))
+        finish_chart(
+            figure, title_of(study, chart), (chart.note, _quantity_words(study, chart, numbers=numbers))
+        )
         write_labels(figure, labels)
     return figure
 
 
-def _quantity_words(study: StudyTable, chart: ChartSpec) -> str:
+def _quantity_words(study: StudyTable, chart: ChartSpec, *, numbers: bool) -> str:
     if not chart.quantity:
         return ""
-    words = f"Numbers in cells: {axis_words(study, chart, chart.quantity)}"
-    return f"{words}; energy has grown where it is above {chart.factor:g}." if chart.factor else f"{words}."
+    name = axis_words(study, chart, chart.quantity)
+    shown = f"Numbers in cells: {name}." if numbers else ""
+    grown = f"Energy has grown where {name} is above {chart.factor:g}." if chart.factor else ""
+    return " ".join(filter(None, (shown, grown)))
 
 
-def _draw_cells(axes: Axes, panel: Panel, *, numbers: bool) -> None:
+def _draw_cells(axes: Axes, panel: ChartPanel, *, numbers: bool) -> None:
     for line in panel.lines:
         for p in line.points:
             colour, mark = COLOURS.get(p.outcome, OTHER)
@@ -136,10 +144,17 @@ def _draw_cells(axes: Axes, panel: Panel, *, numbers: bool) -> None:
                 p.x, p.y + (0.17 if shown else 0), mark, color="#222222", markersize=5, markerfacecolor="none"
             )
             if shown:
-                axes.text(p.x, p.y - 0.22, f"{p.low:.2g}", ha="center", va="center", fontsize=6.5)
+                axes.text(p.x, p.y - 0.22, short_number(p.low), ha="center", va="center", fontsize=6.5)
 
 
-def _name_axes(axes: Axes, panel: Panel, names: list[list[str]]) -> None:
+def short_number(value: float) -> str:
+    """In at most six characters: two digits, or the power of ten of what is very large or small."""
+    if value == 0 or 1e-3 <= abs(value) < 1e4:
+        return f"{value:.2g}" if abs(value) < 100 else f"{value:.0f}"
+    return f"{value:.0e}".replace("e+0", "e").replace("e-0", "e-").replace("e+", "e")
+
+
+def _name_axes(axes: Axes, panel: ChartPanel, names: list[list[str]]) -> None:
     across, up = names
     axes.set_xticks(range(len(across)), across, rotation=90 if max(map(len, across)) > 5 else 0)
     axes.set_yticks(range(len(up)), up)
@@ -149,13 +164,13 @@ def _name_axes(axes: Axes, panel: Panel, names: list[list[str]]) -> None:
     axes.tick_params(length=0)
 
 
-def _on_cells(study: StudyTable, chart: ChartSpec, lines: list[Line]) -> list[Line]:
+def _on_cells(study: StudyTable, chart: ChartSpec, lines: list[ChartLine]) -> list[ChartLine]:
     """Predicted lines at places of cells: between two values by their logarithms where all are positive."""
     x, y = (_places(study.values(name)) for name in (str(chart.x), chart.y[0]))
     found = []
     for line in lines:
-        points = [Point(p.x if np.isinf(p.x) else _place(p.x, x), _place(p.y, y)) for p in line.shown]
-        found.append(Line(line.label, points))
+        points = [ChartPoint(p.x if np.isinf(p.x) else _place(p.x, x), _place(p.y, y)) for p in line.shown]
+        found.append(ChartLine(line.label, points))
     return found
 
 

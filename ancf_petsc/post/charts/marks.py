@@ -19,7 +19,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from ancf_petsc.post.charts.points import Line, Panel, Point
+from ancf_petsc.post.charts.points import ChartLine, ChartPanel, ChartPoint
 from ancf_petsc.post.charts.words import outcome_words
 from ancf_petsc.post.panels import COLOURS, GREY
 from ancf_petsc.post.units import as_typed
@@ -32,19 +32,21 @@ MARGIN = 1.035
 """Height of failed runs, in parts of the axes'."""
 MARGIN_ROW = 0.05
 """Distance of those that stand at one place."""
+TICK_GAP = 0.17
+"""Least distance of ticks of a short logarithmic axis, in parts of it."""
 COLUMN, ROW = 4.6, 3.9
 """Inches of a panel."""
 WRAPPED = 118
 
 
-class Look(NamedTuple):
+class LineLook(NamedTuple):
     """How a line is drawn."""
 
     colour: str
     mark: str
 
 
-class Label(NamedTuple):
+class EndLabel(NamedTuple):
     """Words beside the end of a line at (x, y)."""
 
     text: str
@@ -53,10 +55,10 @@ class Label(NamedTuple):
     colour: str
 
 
-def looks(labels: Iterable[str]) -> dict[str, Look]:
+def looks(labels: Iterable[str]) -> dict[str, LineLook]:
     """A colour and a mark for each line, the same in all panels."""
     pairs = zip(dict.fromkeys(labels), cycle(COLOURS), cycle(MARKS), strict=False)
-    return {label: Look(colour, mark) for label, colour, mark in pairs}
+    return {label: LineLook(colour, mark) for label, colour, mark in pairs}
 
 
 def grid_of_panels(count: int, *, wide: float = COLUMN, high: float = ROW) -> tuple[Figure, list[Axes]]:
@@ -71,7 +73,7 @@ def grid_of_panels(count: int, *, wide: float = COLUMN, high: float = ROW) -> tu
     return figure, list(axes.flat[:count])
 
 
-def draw_points(axes: Axes, line: Line, look: Look, *, joined: bool = True) -> None:
+def draw_points(axes: Axes, line: ChartLine, look: LineLook, *, joined: bool = True) -> None:
     """A line through its points; hollow where seconds do not count, error bars where they are known."""
     points = line.shown
     if not points:
@@ -87,7 +89,7 @@ def draw_points(axes: Axes, line: Line, look: Look, *, joined: bool = True) -> N
         )  # fmt: skip
 
 
-def draw_bars(axes: Axes, line: Line, look: Look) -> None:
+def draw_bars(axes: Axes, line: ChartLine, look: LineLook) -> None:
     """Error bars, within the axes as the points alone have set them."""
     limits = axes.get_ylim()
     for point in line.shown:
@@ -99,7 +101,7 @@ def draw_bars(axes: Axes, line: Line, look: Look) -> None:
     axes.set_ylim(limits)
 
 
-def draw_margin(axes: Axes, lines: Sequence[Line], look: dict[str, Look]) -> list[Point]:
+def draw_margin(axes: Axes, lines: Sequence[ChartLine], look: dict[str, LineLook]) -> list[ChartPoint]:
     """Runs without an answer above the axes, where they stand in x: the mark of their line, crossed out; those drawn."""
     found, taken = [], Counter[float]()
     for line in lines:
@@ -117,7 +119,7 @@ def draw_margin(axes: Axes, lines: Sequence[Line], look: dict[str, Look]) -> lis
     return found
 
 
-def failure_words(points: Sequence[Point], what: str = "Crossed out above") -> str:
+def failure_words(points: Sequence[ChartPoint], what: str = "Crossed out above") -> str:
     """What crosses stand for: how many runs ended in which way."""
     if not points:
         return ""
@@ -128,7 +130,7 @@ def failure_words(points: Sequence[Point], what: str = "Crossed out above") -> s
     return f"{what}: {len(points)} {'run' if len(points) == 1 else 'runs'} without an answer: {names}."
 
 
-def draw_predicted(axes: Axes, panel: Panel) -> list[Label]:
+def draw_predicted(axes: Axes, panel: ChartPanel) -> list[EndLabel]:
     """Predicted lines in grey, dashed; their labels for the right margin."""
     labels = []
     kinds = ((0, (5, 3)), (0, (1, 1.5)), (0, (7, 2, 1, 2)), (0, (3, 2, 1, 2, 1, 2)))
@@ -138,7 +140,7 @@ def draw_predicted(axes: Axes, panel: Panel) -> list[Label]:
             continue
         if len({p.y for p in points}) == 1 and points[0].x == -np.inf:
             axes.axhline(points[0].y, color=GREY, linestyle=kind, linewidth=1.2, zorder=2)
-            labels.append(Label(line.label, np.nan, points[0].y, GREY))
+            labels.append(EndLabel(line.label, np.nan, points[0].y, GREY))
         else:
             axes.plot(
                 [p.x for p in points],
@@ -148,23 +150,23 @@ def draw_predicted(axes: Axes, panel: Panel) -> list[Label]:
                 linewidth=1.4,
                 zorder=2,
             )
-            labels.append(Label(line.label, points[-1].x, points[-1].y, GREY))
+            labels.append(EndLabel(line.label, points[-1].x, points[-1].y, GREY))
     return labels
 
 
-def end_labels(lines: Sequence[Line], look: dict[str, Look]) -> list[Label]:
+def end_labels(lines: Sequence[ChartLine], look: dict[str, LineLook]) -> list[EndLabel]:
     """The words of lines at their last points."""
     return [
-        Label(" ".join(filter(None, (line.label, line.more))), end.x, end.y, look[line.label].colour)
+        EndLabel(" ".join(filter(None, (line.label, line.more))), end.x, end.y, look[line.label].colour)
         for line in lines
         if line.shown
         for end in line.shown[-1:]
     ]
 
 
-def write_labels(figure: Figure, labels: Sequence[tuple[Axes, Sequence[Label]]]) -> None:
+def write_labels(figure: Figure, labels: Sequence[tuple[Axes, Sequence[EndLabel]]]) -> None:
     """Words of lines to the right of the axes, each at the height of its line's end as far as there is room."""
-    made: list[tuple[Axes, list[tuple[Label, Annotation]]]] = []
+    made: list[tuple[Axes, list[tuple[EndLabel, Annotation]]]] = []
     for axes, some in labels:
         pairs = []
         for label in some:
@@ -183,7 +185,7 @@ def write_labels(figure: Figure, labels: Sequence[tuple[Axes, Sequence[Label]]])
         _spread(axes, pairs, figure.dpi)
 
 
-def _spread(axes: Axes, pairs: list[tuple[Label, Annotation]], dpi: float) -> None:
+def _spread(axes: Axes, pairs: list[tuple[EndLabel, Annotation]], dpi: float) -> None:
     """Move the words of one panel apart."""
     box = axes.get_window_extent()
     heights = []
@@ -217,12 +219,12 @@ def plain_ticks(axes: Axes, values: Sequence[float]) -> None:
     known = sorted({value for value in values if value > 0})
     if axes.get_xscale() != "log" or not known or known[-1] >= 100 * known[0]:
         return
-    least = (known[-1] / known[0]) ** (1 / 7)
+    least = (known[-1] / known[0]) ** TICK_GAP
     shown = known[:1]
     for value in known[1:]:
         if value >= least * shown[-1]:
             shown.append(value)
-    axes.set_xticks(shown, [f"{value:.3g}" for value in shown])
+    axes.set_xticks(shown, [f"{value:,.0f}" if value >= 1000 else f"{value:.3g}" for value in shown])
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 

@@ -14,7 +14,7 @@ NAN = float("nan")
 
 
 @dataclass(frozen=True)
-class Point:
+class ChartPoint:
     """A run in a chart. x, y: nan where unknown, then it has no place but the margin. low, high: of the error bar."""
 
     x: float
@@ -33,28 +33,28 @@ class Point:
 
 
 @dataclass
-class Line:
+class ChartLine:
     """Points of one value of the key that makes lines. more: words after its label."""
 
     label: str
-    points: list[Point]
+    points: list[ChartPoint]
     more: str = ""
 
     @property
-    def shown(self) -> list[Point]:
+    def shown(self) -> list[ChartPoint]:
         """What has a place, in ascending x."""
         return sorted((point for point in self.points if point.known), key=lambda point: point.x)
 
 
 @dataclass
-class Panel:
+class ChartPanel:
     """One pair of axes. x, y: words along them."""
 
     title: str
     x: str
     y: str
-    lines: list[Line] = field(default_factory=list)
-    predicted: list[Line] = field(default_factory=list)
+    lines: list[ChartLine] = field(default_factory=list)
+    predicted: list[ChartLine] = field(default_factory=list)
 
     @property
     def count(self) -> int:
@@ -116,7 +116,7 @@ def panel_rows(study: StudyTable, chart: ChartSpec) -> dict[str, list[StudyRow]]
     return {value: [row for row in rows if row.text(key) == value] for value in study.values(key)}
 
 
-def pareto(lines: Sequence[Line]) -> list[Point]:
+def pareto(lines: Sequence[ChartLine]) -> list[ChartPoint]:
     """Marks and returns the points that none beats in x and y, in ascending x."""
     order = sorted(
         (p.x, p.y, k, i) for k, line in enumerate(lines) for i, p in enumerate(line.points) if p.known

@@ -6,26 +6,26 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ancf_petsc.post.charts.points import Line, Point
+from ancf_petsc.post.charts.points import ChartLine, ChartPoint
 from ancf_petsc.post.charts.spec import ChartSpec, PredictedSpec
 from ancf_petsc.post.charts.study_table import StudyRow, StudyTable, same
 
 
 def predicted_lines(
     study: StudyTable, chart: ChartSpec, rows: Sequence[StudyRow], panel: str = ""
-) -> list[Line]:
+) -> list[ChartLine]:
     """What was predicted for the panel of a value. A line across the whole chart has one point, at x = -inf."""
     wanted = [line for line in chart.predicted if line.panel is None or same(panel, line.panel)]
-    return [Line(line.label, _points(study, chart, rows, line)) for line in wanted]
+    return [ChartLine(line.label, _points(study, chart, rows, line)) for line in wanted]
 
 
 def _points(
     study: StudyTable, chart: ChartSpec, rows: Sequence[StudyRow], line: PredictedSpec
-) -> list[Point]:
+) -> list[ChartPoint]:
     if line.value is not None:
-        return [Point(-np.inf, line.factor * line.value)]
+        return [ChartPoint(-np.inf, line.factor * line.value)]
     if line.points is not None:
-        return [Point(x, line.factor * y) for x, y in line.points]
+        return [ChartPoint(x, line.factor * y) for x, y in line.points]
     values = study.values(str(chart.x)) if not study.is_numeric(str(chart.x)) else []
     found: dict[float, float] = {}
     for row in rows:
@@ -33,4 +33,4 @@ def _points(
         y = row.number(str(line.quantity))
         if x == x and y == y:
             found[x] = line.factor * y**line.power
-    return [Point(x, found[x]) for x in sorted(found)]
+    return [ChartPoint(x, found[x]) for x in sorted(found)]

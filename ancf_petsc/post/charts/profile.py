@@ -20,7 +20,7 @@ from ancf_petsc.post.charts.marks import (
     looks,
     write_labels,
 )
-from ancf_petsc.post.charts.points import Line, Panel, Point, grouped
+from ancf_petsc.post.charts.points import ChartLine, ChartPanel, ChartPoint, grouped
 from ancf_petsc.post.charts.spec import ChartSpec
 from ancf_petsc.post.charts.study_table import StudyTable, select
 from ancf_petsc.post.panels import style
@@ -72,7 +72,7 @@ def cheapest(studies: Sequence[StudyTable], chart: ChartSpec, cost: str) -> Cost
     return found
 
 
-def profile_panels(studies: Sequence[StudyTable], chart: ChartSpec) -> list[Panel]:
+def profile_panels(studies: Sequence[StudyTable], chart: ChartSpec) -> list[ChartPanel]:
     """Share of problems over how many times the cheapest each method may cost; one panel a cost."""
     chart = chart if chart.lines else chart.model_copy(update={"lines": (common_key(studies),)})
     panels = []
@@ -84,19 +84,19 @@ def profile_panels(studies: Sequence[StudyTable], chart: ChartSpec) -> list[Pane
         }
         solvable = {name: costs for name, costs in problems.items() if min(costs.values()) < float("inf")}
         methods = list(dict.fromkeys(method for costs in solvable.values() for method in costs))
-        panel = Panel("", f"{COSTS[cost][1]}, times the cheapest", f"share of {len(solvable)} problems")
+        panel = ChartPanel("", f"{COSTS[cost][1]}, times the cheapest", f"share of {len(solvable)} problems")
         for method in methods:
             ratios = sorted(
                 costs.get(method, float("inf")) / min(costs.values()) for costs in solvable.values()
             )
             ratios = [ratio for ratio in ratios if ratio < float("inf")]
-            points = [Point(ratio, (k + 1) / len(solvable)) for k, ratio in enumerate(ratios)]
-            panel.lines.append(Line(method, points or [Point(float("nan"), 0.0)]))
+            points = [ChartPoint(ratio, (k + 1) / len(solvable)) for k, ratio in enumerate(ratios)]
+            panel.lines.append(ChartLine(method, points or [ChartPoint(float("nan"), 0.0)]))
         panels.append(panel)
     return [panel for panel in panels if panel.count > 1]
 
 
-def draw_profile(studies: Sequence[StudyTable], chart: ChartSpec, panels: list[Panel]) -> Figure:
+def draw_profile(studies: Sequence[StudyTable], chart: ChartSpec, panels: list[ChartPanel]) -> Figure:
     """Steps that rise to the share of problems a method solves at all."""
     look = looks(line.label for panel in panels for line in panel.lines)
     with style():

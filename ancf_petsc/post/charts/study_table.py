@@ -17,6 +17,8 @@ from ancf_petsc.post.units import Units, read_units
 
 TABLE, FACTS = "study.csv", "study.json"
 NEEDED = ("status", "outcome", "run")
+NOT_RUN = "not_run"
+"""Outcome of runs that are still to come, or that another share of the study does."""
 ENDED = ("reached", "cut_steps", "energy_grown")
 """Outcomes of runs that came to the end that was asked for."""
 
@@ -129,6 +131,7 @@ def _rows(path: Path) -> list[StudyRow]:
         with path.open(encoding="utf-8", newline="") as file:
             reader = csv.DictReader(file)
             rows = [StudyRow({k: v or "" for k, v in row.items() if k is not None}) for row in reader]
+            rows = [row for row in rows if row.text("outcome") != NOT_RUN]
             columns = reader.fieldnames or ()
     except (OSError, ValueError, csv.Error) as error:
         raise CaseError(f"cannot be read: {error}", file=path, cure="run ancf study again") from error

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ancf_petsc.post.charts.marks import (
-    Look,
+    LineLook,
     draw_margin,
     draw_points,
     draw_predicted,
@@ -20,7 +20,7 @@ from ancf_petsc.post.charts.marks import (
     plain_ticks,
     write_labels,
 )
-from ancf_petsc.post.charts.points import Line, Panel, Point, grouped, panel_rows
+from ancf_petsc.post.charts.points import ChartLine, ChartPanel, ChartPoint, grouped, panel_rows
 from ancf_petsc.post.charts.predicted import predicted_lines
 from ancf_petsc.post.charts.spec import ChartSpec
 from ancf_petsc.post.charts.study_table import StudyTable
@@ -31,39 +31,43 @@ NAMED_ENDS = 14
 """Charts with more runs that ended early leave their names to the CSV."""
 
 
-def value_panels(study: StudyTable, chart: ChartSpec) -> list[Panel]:
+def value_panels(study: StudyTable, chart: ChartSpec) -> list[ChartPanel]:
     """A quantity over x; keys of words stand at the numbers of their values."""
     x, quantity, panels = str(chart.x), str(chart.quantity), []
     places = {} if study.is_numeric(x) else {value: k for k, value in enumerate(study.values(x))}
     for value, rows in panel_rows(study, chart).items():
         title = value_words(chart, str(chart.panels), value) if chart.panels else ""
-        panel = Panel(title, axis_words(study, chart, x), axis_words(study, chart, quantity))
+        panel = ChartPanel(title, axis_words(study, chart, x), axis_words(study, chart, quantity))
         panel.x, panel.y = chart.x_label or panel.x, chart.y_label or panel.y
         for label, some in grouped(study, rows, chart).items():
             points = [
-                Point(
+                ChartPoint(
                     float(places[row.text(x)]) if places else row.number(x), row.number(quantity),
                     ended=row.ended, outcome=row.outcome, run=row.text("run"),
                 )
                 for row in some
             ]  # fmt: skip
-            panel.lines.append(_relative(Line(label, points)) if chart.relative else Line(label, points))
+            panel.lines.append(
+                _relative(ChartLine(label, points)) if chart.relative else ChartLine(label, points)
+            )
         panel.predicted = predicted_lines(study, chart, rows, value)
         panels.append(panel)
     return [panel for panel in panels if panel.count > 1]
 
 
-def _relative(line: Line) -> Line:
+def _relative(line: ChartLine) -> ChartLine:
     """Over the value at the smallest x."""
     first = line.shown[0].y if line.shown else float("nan")
-    return Line(line.label, [replace(point, y=point.y / first) for point in line.points]) if first else line
+    return (
+        ChartLine(line.label, [replace(point, y=point.y / first) for point in line.points]) if first else line
+    )
 
 
-def draw_values(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> Figure:
+def draw_values(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -> Figure:
     """Lines through the runs; a cross on a point whose run ended before its end, with the reason's short name."""
     look = looks(line.label for panel in panels for line in panel.lines)
     ends = [p for panel in panels for line in panel.lines for p in line.shown if not p.ended]
-    failed: list[Point] = []
+    failed: list[ChartPoint] = []
     with style():
         figure, places = grid_of_panels(len(panels), wide=6.2 if len(panels) == 1 else 4.9, high=4.2)
         labels = []
@@ -82,7 +86,7 @@ def draw_values(study: StudyTable, chart: ChartSpec, panels: list[Panel]) -> Fig
     return figure
 
 
-def _scale(axes: Axes, study: StudyTable, chart: ChartSpec, panel: Panel) -> None:
+def _scale(axes: Axes, study: StudyTable, chart: ChartSpec, panel: ChartPanel) -> None:
     axes.set(xlabel=panel.x, ylabel=panel.y)
     if study.is_numeric(str(chart.x)):
         along = [p.x for line in panel.lines for p in line.points]
@@ -99,7 +103,7 @@ def _scale_of(values: list[float]) -> str:
     return "log" if values and min(values) > 0 and max(values) > 10 * min(values) else "linear"
 
 
-def _draw_ends(axes: Axes, line: Line, look: Look, *, named: bool) -> None:
+def _draw_ends(axes: Axes, line: ChartLine, look: LineLook, *, named: bool) -> None:
     for point in line.shown:
         if not point.ended:
             axes.plot(point.x, point.y, "x", color="#000000", markersize=8, markeredgewidth=1.3, zorder=5)
@@ -110,7 +114,7 @@ def _draw_ends(axes: Axes, line: Line, look: Look, *, named: bool) -> None:
                 )  # fmt: skip
 
 
-def _ends_words(ends: list[Point]) -> str:
+def _ends_words(ends: list[ChartPoint]) -> str:
     return (
         failure_words(ends, "Black crosses").replace("without an answer", "that ended before") if ends else ""
     )
