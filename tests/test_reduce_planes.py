@@ -229,6 +229,7 @@ def test_moments_of_a_box(tmp_path):
 
 # --- refusals
 
+MOTION = {"duration": 1.0, "step": 0.1}
 SIDEWAYS = [{"type": "gravity", "acceleration": [1.0, 0.0, 0.0]}]
 REFUSED = {
     "gravity": ({"load": SIDEWAYS}, "half-x", r"about x = 1: load\.0: its direction \(1, 0, 0\) is not in the plane"),
@@ -240,7 +241,7 @@ REFUSED = {
     "support": ({"constraint.low.group": "corner"}, "half-x", r"constraint\.corner: corner at .* has no mirror image"),
     "one plane only": ({"load": SIDEWAYS}, "quarter", "about x = 1: load.0.*about z = 1.5: constraint.low: low at"),
     "spin": (
-        {"statics": None, "initial": {"spin": [1.0, 0.0, 0.0]}, "dynamics": {"duration": 1.0, "step": 0.1}, "constraint.high": None},
+        {"initial": {"spin": [1.0, 0.0, 0.0]}, "dynamics": MOTION, "statics": None, "constraint.high": None},
         "half-y",
         r"initial\.spin: its direction \(1, 0, 0\) is not normal to the plane",
     ),

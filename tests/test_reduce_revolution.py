@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 from scene_bodies import CENTRE, INNER, OUTER, box_case, box_mesh, ring_case, ring_mesh
 
-from ancf_petsc import CaseError, case_from_dict, load_case
+from ancf_petsc import CaseError, case_from_dict, load_case, run
 from ancf_petsc.mesh.gmsh_session import gmsh_session
 from ancf_petsc.mesh.kinds import KINDS, part_sizes, qualities
 from ancf_petsc.plan.plan import make_plan
 from ancf_petsc.reduce.prism import prism_of
 from ancf_petsc.reduce.profile import profile_of
+from ancf_petsc.reduce.profile_lines import simplified, traced
+from ancf_petsc.reduce.profile_mesh import meshed
 from ancf_petsc.reduce.revolution import Ring, ring_of
-from ancf_petsc.reduce.section import meshed, simplified, traced
 from ancf_petsc.reduce.symmetry import Scene
 from ancf_petsc.reduce.write import reduce, write_case
 
@@ -118,6 +119,24 @@ def test_a_disc_and_a_hollow_sphere_have_sections_that_end_on_the_axis(tmp_path)
     assert "skin" in mesh.groups
 
 
+def test_the_section_has_the_force_of_the_ring_and_of_its_half(tmp_path):
+    """Within what two coarse meshes of quadratic elements differ by; sectors keep their angle, so that symmetry stays."""
+    whole = ring_case(tmp_path, "3-10-1-3", axis=1, size=2.2)
+    half, _ = write_case(reduce(whole, "half-z"), tmp_path / "half")
+    expected = run(whole, tmp_path / "whole").curve["force"][-1]
+    for number, case in enumerate((whole, half)):
+        folder = tmp_path / f"section {number}"
+        section, plan = write_case(reduce(case, "section", 1.5), folder)
+        assert section.spec.mesh.element == "2-6-1-2"
+        assert section.spec.section.axis == "y"
+        assert section.spec.section.angle == (180.0 if number else None)
+        assert section.spec.output.symmetry == (2 if number else 1)
+        assert len(plan.mesh.cells) < 100
+        assert run(section, tmp_path / f"run {number}").curve["force"][-1] == pytest.approx(
+            expected, rel=0.02
+        )
+
+
 def test_rotating_mirrors_what_leaves_a_sector():
     ring = Ring(
         np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]), np.pi / 2, ("a", "b")
@@ -128,8 +147,9 @@ def test_rotating_mirrors_what_leaves_a_sector():
     np.testing.assert_allclose(height, 5.0)
 
 
+SIDEWAYS = [{"type": "force", "group": "high", "total": [1.0, 0.0, 0.0]}]
 WRONG = {
-    "a force across": ({"load": [{"type": "force", "group": "high", "total": [1.0, 0.0, 0.0]}]}, r"load\.0: what it does to high is not along"),
+    "a force across": ({"load": SIDEWAYS}, r"load\.0: what it does to high is not along"),
     "weight across": (
         {"load": [{"type": "gravity", "acceleration": [0.0, 1.0, 0.0]}], "material.density": 1.0},
         r"load\.0: \(0, 1, 0\) is not along the axis",

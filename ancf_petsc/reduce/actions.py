@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ancf_petsc.axes import AXES
 from ancf_petsc.input.load import Case

@@ -31,9 +31,9 @@ COUNTS = {1: "half", 2: "a quarter", 3: "an eighth"}
 class Finding:
     """One thing a scene allows.
 
-    kind: "mirror", "revolution", "prism", "inertia", "linear", "path" or "outputs". sentence: what, and what it saves. how: a command
-    or keys, "" where nothing is to be done. factor: part of the degrees of freedom (or of the solutions, of kinds about the path)
-    that is left. elements: of the smaller model, None where it is the same. within: the relative error it brings, 0 for none.
+    kind: "mirror", "revolution", "prism", "inertia", "linear", "path" or "outputs". sentence: what, and what it saves. how: a
+    command or keys, "" where nothing is to be done. factor: part of the degrees of freedom (or of the solutions, of kinds about
+    the path) that is left. elements: of the smaller model, None where it is the same. within: the relative error it brings.
     """
 
     kind: str
@@ -229,7 +229,10 @@ def _of_strain(case: Case, results: Results, within: float) -> Iterator[Finding]
     worst = max(gradient, straight)
     if worst > within:
         return
-    sentence = f"strains and rotations stay below {gradient:.2g}, and force follows stroke in a straight line within {straight:.1g}: one step does"
+    sentence = (
+        f"strains and rotations stay below {gradient:.2g}, and force follows stroke in a straight line within {straight:.1g}: "
+        "one step does"
+    )
     count = len(output_times(case.spec, case.file))
     if count > 1:
         yield Finding(

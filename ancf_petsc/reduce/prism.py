@@ -11,7 +11,7 @@ from ancf_petsc.reduce.symmetry import Scene
 
 
 def prism_of(scene: Scene) -> tuple[int, float] | None:
-    """The axis that a body is prismatic along, held at both ends along it and nothing acting along it, and its length; else None."""
+    """The axis that a body is prismatic along, held at both ends, with nothing acting along it, and its length; else None."""
     points = scene.mesh.points[scene.mesh.used]
     for axis in range(3):
         low, high = points[:, axis].min(), points[:, axis].max()

@@ -1,6 +1,6 @@
 """The section of a body of revolution: where a half-plane through the axis meets its surface, as closed lines of radius and height.
 
-Facets are chords: the line is taken in cylindrical coordinates, in which a chord between two nodes at one radius stays at that radius.
+Facets are chords: the line is taken in cylindrical coordinates, in which a chord between nodes at one radius stays at it.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numpy as np
 from ancf_petsc.errors import CaseError
 from ancf_petsc.mesh.groups import parts_for_support
 from ancf_petsc.mesh.mesh import Integers
+from ancf_petsc.mesh.parts import rows_in
 from ancf_petsc.reduce.revolution import WHOLE, Ring, on_walls
 from ancf_petsc.reduce.shape import CLOSE, Floats, triangles
-from ancf_petsc.mesh.parts import rows_in
 from ancf_petsc.reduce.symmetry import Scene
 
 PLACES = np.linspace(0.31, 0.69, 39)

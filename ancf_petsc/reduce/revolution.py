@@ -5,19 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ancf_petsc.reduce.actions import SAME, Action, directions, targets
 from ancf_petsc.reduce.shape import CLOSE, Floats, Shape, departure
 from ancf_petsc.reduce.symmetry import MirrorPlane, Scene, flat_normal, place
 
-TURNS = np.array([0.1180, 0.2639, 0.3820, 0.5279, 0.6459, 0.7639, 0.9098])
+TURNS = (0.1180, 0.2639, 0.3820, 0.5279, 0.6459, 0.7639, 0.9098)
 """Parts of the sector by which a body is rotated to see whether it stays what it is; no two are in a simple ratio."""
 WHOLE = 2.0 * np.pi
 
 
 @dataclass(frozen=True)
 class Ring:
-    """A sector of a body of revolution: an axis through `point` (3,) along `axis` (3,), the angle of the sector, from `start` (3,) on.
+    """A sector of a body of revolution: an axis through `point` (3,) along `axis` (3,), the sector's angle, from `start` (3,) on.
 
     walls: keys of the supports on the planes that bound the sector. across (3,): third direction, right-handed.
     """
@@ -153,12 +154,10 @@ def _way(shape: Shape, point: Floats, axis: Floats) -> Floats:
 def why_no_ring(scene: Scene, ring: Ring) -> str:
     """Why a scene is not one of revolution about an axis; empty if it is."""
     for key, vector, kind in directions(scene.case):
-        if kind == "spin" or np.linalg.norm(np.cross(vector, ring.axis)) > SAME * np.linalg.norm(vector):
-            return (
-                f"{key}: {place(vector)} is not along the axis"
-                if kind != "spin"
-                else f"{key}: the body rotates"
-            )
+        if kind == "spin":
+            return f"{key}: the body rotates"
+        if np.linalg.norm(np.cross(vector, ring.axis)) > SAME * np.linalg.norm(vector):
+            return f"{key}: {place(vector)} is not along the axis"
     if len(scene.case.spec.material) > 1:
         return "material: there are several, and sections are made of one"
     acting = [action for action in scene.actions if action.key not in ring.walls]
@@ -173,31 +172,28 @@ def _differs(ring: Ring, action: Action) -> str:
     turn = np.cross(np.eye(3), ring.axis)
     if np.abs(turn @ action.held - action.held @ turn).max() > CLOSE:
         return f"{action.key}: components held on {name} differ around the axis"
-    if np.linalg.norm(np.cross(action.amount, ring.axis)) > SAME * max(np.linalg.norm(action.amount), 1e-300):
+    if np.linalg.norm(np.cross(action.amount, ring.axis)) > SAME * np.linalg.norm(action.amount):
         return f"{action.key}: what it does to {name} is not along the axis"
     return ""
 
 
 def _moves(scene: Scene, ring: Ring, acting: list[Action]) -> str:
     """Why a shape is not what it was after a rotation."""
-    skin = outside(scene, ring)
-    for name, shape, target in [
-        ("the surface", skin, scene.surface.shape),
-        *(
-            (f"{action.key}: {' and '.join(action.groups)}", action.shape, target)
-            for action in acting
-            for target in targets(action, acting, action.held, action.amount)[:1]
-        ),
-    ]:
+    checks = [("the surface", outside(scene, ring), scene.surface.shape)]
+    for action in acting:
+        found = targets(action, acting, action.held, action.amount)
+        checks.append((f"{action.key}: {' and '.join(action.groups)}", action.shape, found[0]))
+    for name, shape, target in checks:
         points, slack = shape.samples
         for part in TURNS:
             worst, which = departure(ring.rotated(points, part), slack, target, scene.size)
             if worst > CLOSE:
-                return f"{name} at {place(points[which])}, rotated by {np.degrees(part * ring.angle):.4g} degrees, lies off by {worst * scene.size:.3g}"
+                turned = f"rotated by {np.degrees(part * ring.angle):.4g} degrees"
+                return f"{name} at {place(points[which])}, {turned}, lies off by {worst * scene.size:.3g}"
     return ""
 
 
-def on_walls(scene: Scene, ring: Ring) -> Floats:
+def on_walls(scene: Scene, ring: Ring) -> NDArray[np.bool_]:
     """(t,) which facets of the surface lie on the planes that bound the sector."""
     found = np.zeros(len(scene.surface.facets), bool)
     for action, plane in walls_of(scene):

@@ -1,7 +1,8 @@
 """Surfaces, edges and points of a mesh as shapes, and whether one shape lies on another.
 
-A polyhedron approximates curved surfaces by chords: two meshes of one curved surface differ by as much as the chords leave out. What
-they may differ by is therefore taken from the angles between neighbouring facets; flat surfaces have to agree to rounding.
+A polyhedron approximates curved surfaces by chords: two meshes of one curved surface differ by as much as the chords leave
+out. What they may differ by is therefore taken from the angles between neighbouring facets; flat surfaces have to agree to
+rounding.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def normals(points: Floats, facets: Integers) -> Floats:
 
 
 class Surface:
-    """The boundary of a solid mesh: facets (t, 3), indices of points, seen from outside counterclockwise; normals (t, 3), slack (t,)."""
+    """The boundary of a solid mesh: facets (t, 3), indices of points, counterclockwise from outside; normals (t, 3), slack (t,)."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh

@@ -39,7 +39,7 @@ class SmallerCase:
 
 
 def tables_and_mesh(case: Case, mesh: Mesh) -> SmallerCase:
-    """The tables of a case as read, on its own mesh: its groups are groups of the mesh, and elements of materials have their own."""
+    """A case's tables on its own mesh: its groups are groups of the mesh, the elements of each material a group of their own."""
     data = deepcopy(toml.parse(case.text))
     data.pop("groups", None)
     groups = {name: replace(group, cells=None) for name, group in mesh.groups.items()}
@@ -59,7 +59,7 @@ def free_name(mesh: Mesh, name: str) -> str:
 
 
 def halve(smaller: SmallerCase, before: Mesh, plane: MirrorPlane, name: str, support: dict[str, Any]) -> None:
-    """Enter into the tables that the mesh is the part of `before` on the side of a plane's normal, with the group `name` on the plane."""
+    """Let the tables be those of the part of `before` on the side of a plane's normal, with the group `name` on the plane."""
     data = smaller.data
     data["load"] = [
         entry for load in data.get("load", []) for entry in _halved(smaller, before, plane, name, load)

@@ -20,7 +20,10 @@ KINDS_OF_PARTS = (*HALVES, QUARTER, SECTION)
 
 
 def reduce(case: Case, to: str, size: float | None = None) -> SmallerCase:
-    """The smaller case of a kind. size: length of edges of a section, by default those of the body. Raises CaseError where the scene does not allow it, with the reason."""
+    """The smaller case of a kind. size: length of edges of a section, by default those of the body.
+
+    Raises CaseError where the scene does not allow it, with the reason.
+    """
     plan = make_plan(case)
     if plan.element.cell.dimension != 3:
         raise CaseError(
