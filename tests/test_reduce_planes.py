@@ -116,6 +116,25 @@ def test_a_group_on_one_side_keeps_its_force(tmp_path):
     assert "probe.right: nothing of right is in the part that is kept" in said
 
 
+def test_a_cut_gives_sets_of_nodes_no_new_faces(tmp_path):
+    """Nodes through the whole middle of the box carry a force as the faces and points of the whole body that they cover."""
+    slab = {"box": [[0.5, 0.0, 1.0], [1.5, 1.0, 2.0]]}
+    case = box_case(
+        tmp_path,
+        groups={"low": {"plane": "z", "at": "min"}, "slab": slab, "section": {"plane": "x", "at": 1.0}},
+        constraint=[{"group": "low", "fix": ["x", "y", "z"]}],
+        load=[
+            {"type": "force", "group": "slab", "total": [0.0, 0.0, 40.0]},
+            {"type": "force", "group": "section", "total": [0.0, 0.0, 25.0]},
+        ],
+        probe=[{"name": "section", "group": "section"}],
+        output={},
+    )
+    half, _ = smaller(case, "half-x", tmp_path / "half")
+    whole, part = run(case, tmp_path / "a"), run(half, tmp_path / "b")
+    np.testing.assert_allclose(part.probes["section.uz"], whole.probes["section.uz"], rtol=SAME)
+
+
 def test_several_materials_and_quadratic_tetrahedra(tmp_path):
     """A stiff middle; tetrahedra made of mirrored bricks, with their mid-nodes and groups."""
     points, cells = mirrored_tetrahedra()

@@ -93,11 +93,13 @@ def _mirrors(scene: Scene) -> Iterator[Finding]:
         crossed = any(crossing_cells(scene.mesh, plane) for plane in usable)
         parts = 2 ** len(usable)
         more = f", and again about {aligned[2].describe()}" if len(aligned) > 2 else ""
-        meshed = "; it is meshed anew, for elements lie across" if crossed else ""
+        anew = crossed and scene.mesh.kind == "tetra" and len(scene.case.spec.material) == 1
+        meshed = "; it is meshed anew, for elements lie across" if anew else ""
+        meshed = meshed or ("; it takes a mesh with faces on the planes" if crossed else "")
         yield Finding(
             "mirror",
             f"symmetric about {_joined(usable)}{more}: {COUNTS[len(usable)]} does, {count // parts} of {count} elements{meshed}",
-            f"ancf reduce {case} --to {to}",
+            f"ancf reduce {case} --to {to}" if anew or not crossed else "",
             1.0 / parts,
             count // parts,
         )

@@ -65,6 +65,8 @@ def remeshed(mesh: Mesh, planes: Sequence[tuple[MirrorPlane, str]], file: Path |
         )
     for name, nodes in skin.nodes.items():
         groups[name] = Group(name, np.unique(compact[nodes]), {0: np.unique(compact[nodes])[:, None]})
+    for name in mesh.groups:
+        groups.setdefault(name, Group(name, np.empty(0, np.int64)))
     return Mesh(
         points=points[used],
         kind="tetra",

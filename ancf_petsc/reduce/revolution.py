@@ -160,10 +160,16 @@ def why_no_ring(scene: Scene, ring: Ring) -> str:
             return f"{key}: {place(vector)} is not along the axis"
     if len(scene.case.spec.material) > 1:
         return "material: there are several, and sections are made of one"
-    acting = [action for action in scene.actions if action.key not in ring.walls]
+    acting = acting_on(scene, ring)
     return next((why for action in acting if (why := _differs(ring, action))), "") or _moves(
         scene, ring, acting
     )
+
+
+def acting_on(scene: Scene, ring: Ring) -> list[Action]:
+    """What acts on a scene beside the planes of symmetry that bound the sector."""
+    walls = {id(action) for action, _ in walls_of(scene) if action.key in ring.walls}
+    return [action for action in scene.actions if id(action) not in walls]
 
 
 def _differs(ring: Ring, action: Action) -> str:

@@ -12,7 +12,7 @@ from ancf_petsc.errors import CaseError
 from ancf_petsc.reduce.profile import profile_of
 from ancf_petsc.reduce.profile_lines import simplified
 from ancf_petsc.reduce.profile_mesh import meshed
-from ancf_petsc.reduce.revolution import Ring, ring_of
+from ancf_petsc.reduce.revolution import Ring, acting_on, ring_of
 from ancf_petsc.reduce.shape import CLOSE
 from ancf_petsc.reduce.symmetry import Scene
 from ancf_petsc.reduce.tables import SmallerCase, tables_and_mesh
@@ -77,8 +77,8 @@ def _supports(scene: Scene, ring: Ring, radial: int, axial: int) -> list[dict[st
     """What the supports hold and move along the radius and the axis; those on the planes of the sector are no longer needed."""
     across = np.linalg.svd(ring.axis[None])[2][1]
     rows = []
-    for action in scene.actions:
-        if action.kind != "support" or action.key in ring.walls:
+    for action in acting_on(scene, ring):
+        if action.kind != "support":
             continue
         amount = float(action.amount @ ring.axis)
         fix = [AXES[radial]] if np.linalg.norm(action.held @ across) > CLOSE else []

@@ -23,7 +23,8 @@ CREASE = np.radians(40.0)
 """Facets that meet at a larger angle meet at an edge of the body; at a smaller one they approximate a curved surface."""
 CHORD = 0.5
 """Of edge times angle: an arc departs by an eighth of it from its chord; facets at odd angles to the arc by more."""
-NEAREST, MOST_PAIRS = 12, 4_000_000
+NEAREST, MOST_PAIRS = 12, 1_000_000
+BLOCK = MOST_PAIRS // NEAREST
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,9 @@ def departure(points: Floats, slack: Floats, target: Shape, size: float) -> tupl
     """How far points (k, 3) lie off a shape beyond the slack of both, relative to `size`, at most, and which point does."""
     if not len(target):
         return np.inf, 0
-    excess = _excess(points, slack, target, _candidates(points, target))
+    pairs = _candidates(points, target)
+    blocks = [slice(k, k + BLOCK) for k in range(0, len(points), BLOCK)]
+    excess = np.concatenate([_excess(points[own], slack[own], target, pairs[own]) for own in blocks])
     again = np.flatnonzero(excess > CLOSE * size)
     rows = max(1, MOST_PAIRS // len(target))
     for k in range(0, len(again), rows):  # the nearest centres need not be of the nearest part

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from ancf_petsc.axes import AXES
+from ancf_petsc.errors import CaseError
 from ancf_petsc.input import toml
 from ancf_petsc.input.load import Case
-from ancf_petsc.mesh.groups import cells_of, parts_for_load
+from ancf_petsc.mesh.groups import cells_of, parts_for_load, parts_for_support
 from ancf_petsc.mesh.kinds import KINDS, part_kind, part_sizes
-from ancf_petsc.mesh.mesh import Group, Mesh
+from ancf_petsc.mesh.mesh import Group, Integers, Mesh
 from ancf_petsc.reduce.shape import CLOSE, Floats
 from ancf_petsc.reduce.symmetry import MirrorPlane
 
@@ -42,7 +43,7 @@ def tables_and_mesh(case: Case, mesh: Mesh) -> SmallerCase:
     """A case's tables on its own mesh: its groups are groups of the mesh, the elements of each material a group of their own."""
     data = deepcopy(toml.parse(case.text))
     data.pop("groups", None)
-    groups = {name: replace(group, cells=None) for name, group in mesh.groups.items()}
+    groups = {name: Group(name, group.nodes, _parts_of(mesh, group)) for name, group in mesh.groups.items()}
     dimension = KINDS[mesh.kind].dimension
     for row in data["material"] if isinstance(data["material"], list) else [data["material"]]:
         group = mesh.groups.get(row.get("group", ""))
@@ -51,6 +52,14 @@ def tables_and_mesh(case: Case, mesh: Mesh) -> SmallerCase:
             row["group"] = free_name(mesh, f"elements of {group.name}")
             groups[row["group"]] = Group(row["group"], np.unique(cells), {dimension: cells})
     return SmallerCase(data, replace(mesh, groups=groups))
+
+
+def _parts_of(mesh: Mesh, group: Group) -> dict[int, Integers]:
+    """What a group is taken for on the whole body: faces that a cut makes shall not be of a set of nodes."""
+    if group.parts:
+        return group.parts
+    dimension, rows = parts_for_load(mesh, group)
+    return {dimension: rows} if dimension else parts_for_support(mesh, group) or {0: group.nodes[:, None]}
 
 
 def free_name(mesh: Mesh, name: str) -> str:
@@ -96,6 +105,14 @@ def _halved(
     if load["type"] != "force":
         return [load]
     group, size = load["group"], CLOSE * before.size
+    if group not in smaller.mesh.groups:
+        raise CaseError(
+            "a force acts in a plane of symmetry, and the part is meshed anew",
+            key="--to",
+            got=group,
+            expected="faces of elements on the plane",
+            cure="mesh the body in two halves",
+        )
     whole = sum(_measures(before, before.groups[group], plane, size))
     kept, on_plane = _measures(smaller.mesh, smaller.mesh.groups[group], plane, size)
     total = np.array(load["total"], dtype=float)
