@@ -1,4 +1,4 @@
-"""docs/verification.md from docs/verification/checks.json, platforms.json and mutations.json."""
+"""docs/verification.md from docs/verification/*.json."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from typing import Any
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 CHECKS, MUTATIONS = DOCS / "verification" / "checks.json", DOCS / "verification" / "mutations.json"
 PLATFORMS = DOCS / "verification" / "platforms.json"
+KILLS, LEAKS = DOCS / "verification" / "kills.json", DOCS / "verification" / "leaks.json"
 PAGE = DOCS / "verification.md"
 HEAD = """# Verification
 
 *Made by `scripts/verify` from `docs/verification/`; do not edit.* `scripts/verify` computes every number under *found* again and
 ends with exit code 1 if an error is beyond its bound. `scripts/test_debian` and `scripts/test_current_petsc` make the table of
-platforms, `scripts/mutate` the last one.
+platforms, `scripts/soak_kills` and `scripts/soak_leaks` those of kills and leaks, `scripts/mutate` the last one.
 """
 
 
@@ -80,6 +81,41 @@ def platforms_part(rows: list[dict[str, Any]]) -> list[str]:
     return [*lines, ""]
 
 
+def kills_part(rows: list[dict[str, Any]]) -> list[str]:
+    """Runs that were killed, and what was lost."""
+    lines = [
+        "## Kills and power cuts",
+        "",
+        "`scripts/soak_kills` kills runs at random moments, on several ranks one of them or all, cuts files at random lengths as a "
+        "power cut may, and lets each go on until it ends. Differences are those from the uninterrupted run on one rank: of all "
+        "fields, over the largest number of each; no step is missing and none is there twice.",
+        "",
+        "| what | ranks | kills survived | power cuts | runs | equal to the last bit | largest difference |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    names = ("what", "ranks", "kills", "power_cuts", "runs", "equal_to_the_bit")
+    for row in rows:
+        words = (*(str(row[name]) for name in names), brief(row["largest_difference"]))
+        lines.append("| " + " | ".join(map(cell, words)) + " |")
+    return [*lines, ""]
+
+
+def leaks_part(rows: list[dict[str, Any]]) -> list[str]:
+    """What grew over many steps and runs."""
+    lines = [
+        "## Memory and handles",
+        "",
+        "`scripts/soak_leaks`: growth from the first quarter of the work to its end.",
+        "",
+        "| what | done | resident memory, MB | open files and threads |",
+        "|---|---|---|---|",
+    ]
+    for row in rows:
+        words = (row["what"], str(row["done"]), brief(row["memory_growth_mb"]), str(row["handles_growth"]))
+        lines.append("| " + " | ".join(map(cell, words)) + " |")
+    return [*lines, ""]
+
+
 def mutations_part(rows: list[dict[str, Any]]) -> list[str]:
     """Wrong changes: survivors first, then which test caught each."""
     survivors = [row for row in rows if not row["caught_by"]]
@@ -118,6 +154,9 @@ def write_page() -> Path:
         lines += checks_part(json.loads(CHECKS.read_text()))
     if PLATFORMS.is_file():
         lines += platforms_part(json.loads(PLATFORMS.read_text()))
+    for file, part in ((KILLS, kills_part), (LEAKS, leaks_part)):
+        if file.is_file():
+            lines += part(json.loads(file.read_text()))
     if MUTATIONS.is_file():
         lines += mutations_part(json.loads(MUTATIONS.read_text()))
     PAGE.write_text("\n".join(lines).rstrip("\n") + "\n", encoding="utf-8")

@@ -69,7 +69,7 @@ def test_an_order_that_drifts_is_no_order():
 
 
 CANTILEVER = {
-    # meshes of cubes: divisions across, displacement of the tip (docs/elements.md); the limit is -0.35020 m
+    # meshes of cubes: divisions across, displacement of the tip (docs/accuracy.md); the limit is -0.35020 m
     "3-10-1-3": (2, (1, 2, 4), (-0.3447538, -0.3488355, -0.3497769)),
     "3443": (2, (1, 2, 4), (-0.3449803, -0.348819, -0.3497567)),
     "3413": (1, (1, 2, 4, 8), (-0.0871627, -0.1944684, -0.2898559, -0.3323478)),

@@ -43,10 +43,12 @@ def build(case: Case, comm: MPI.Comm) -> Built:
     return build_from(case, plan, comm)
 
 
-def build_from(case: Case, plan: Plan | None, comm: MPI.Comm) -> Built:
-    """Distribute a plan, which the root rank holds. Collective."""
+def build_from(
+    case: Case, plan: Plan | None, comm: MPI.Comm, owners: Callable[[Plan], NDArray] | None = None
+) -> Built:
+    """Distribute a plan, which the root rank holds. owners: gives the rank of each node, where they are known. Collective."""
     root = FromRoot(comm, plan)
-    body = _make_body(case, root)
+    body = _make_body(case, root, owners)
     rows = _Rows(root, body)
     model = Model(
         **vars(body),
@@ -66,11 +68,14 @@ def build_from(case: Case, plan: Plan | None, comm: MPI.Comm) -> Built:
     )
 
 
-def _make_body(case: Case, root: FromRoot[Plan]) -> Body:
+def _make_body(case: Case, root: FromRoot[Plan], owners: Callable[[Plan], NDArray] | None) -> Body:
     """Nodes and cells of this rank, its cells sorted by material, own ones first."""
     comm, spec, row = root.comm, case.spec, element(case.spec.mesh.element)
     nodes = distribute(
-        comm, root.slab(lambda plan: plan.space.cells), root.value(lambda plan: len(plan.space.nodes))
+        comm,
+        root.slab(lambda plan: plan.space.cells),
+        root.value(lambda plan: len(plan.space.nodes)),
+        None if owners is None else root.slab(owners),
     )
     first = root.rows(
         lambda plan: np.stack((plan.space.first[:-1], np.diff(plan.space.first)), axis=1), nodes.file_nodes

@@ -57,13 +57,51 @@ class MotionRun:
         self._kinetic = 0.0
         self._start_energy = 0.0
         self._begun = time.perf_counter()
+        self._from: float | None = None  # time of the state that the run goes on from
         self.path = TimeIntegration(integrator, times, self._on_step, self._on_corner, stop)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether `state` says all."""
+        return self.integrator.is_ready
+
+    @property
+    def place(self) -> str:
+        """Where it is, in words."""
+        return f"time {self.integrator.time:.6g}"
+
+    def state(self) -> dict[str, Any]:
+        """All that the rest of the run hangs on, between two steps. Collective."""
+        return {
+            "totals": self.totals,
+            "since": self._since,
+            "row": self.record.row,
+            "written": self._written,
+            "work": self.work.state(),
+            "work_is_due": self._work_is_due,
+            "kinetic": self._kinetic,
+            "start_energy": self._start_energy,
+            "control": self.control.state(),
+            "integrator": self.integrator.state(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Let `go` go on from a state. Collective."""
+        self.totals, self._since = dict(state["totals"]), dict(state["since"])
+        self.record.row, self._written = dict(state["row"]), state["written"]
+        self.work.restore(state["work"])
+        self._work_is_due, self._kinetic = state["work_is_due"], state["kinetic"]
+        self._start_energy = state["start_energy"]
+        self.control.restore(state["control"])
+        self.integrator.restore(state["integrator"])
+        self._from = self.integrator.time
 
     def go(self) -> None:
         """To the end. Raises MotionStopped or Interrupted, with the last good state saved."""
-        self.work.start(0.0, self._powers())
-        self._start_energy = self.assembly.strain_energy(self.integrator.x) + self._kinetic_energy()
-        self._write()
+        if self._from is None:
+            self.work.start(0.0, self._powers())
+            self._start_energy = self.assembly.strain_energy(self.integrator.x) + self._kinetic_energy()
+            self._write()
         try:
             self.path.run()
         except (MotionStopped, Interrupted):
@@ -183,7 +221,7 @@ class MotionRun:
 
     def _log_output(self, row: dict[str, float]) -> None:
         now, spent = self.integrator.time, time.perf_counter() - self._begun
-        rate = now / spent if spent else 0.0
+        rate = (now - (self._from or 0.0)) / spent if spent else 0.0
         left = (self.duration - now) / rate if rate else 0.0
         log.info(
             "t %-10.6g energies: kinetic %10.4g  strain %10.4g  drift %9.2g  steps %5d  newton %5d  "

@@ -65,16 +65,56 @@ class StaticRun:
         self.marks = Marks.of(times, [corner for ramp in ramps for corner in ramp.corners()])
         self.work = PathWork(model.drives, model.loads)
         self._x, self._written = self.assembly.reference_vector(), 0.0
+        self._path: LoadPath | ArcLength | None = None
+        self._rising: tuple[LoadPath, PathWork] | None = None
+        self._restored: dict[str, Any] = {}
+
+    is_ready = True
+
+    @property
+    def place(self) -> str:
+        """Where it is, in words."""
+        if self._path is not None:
+            return f"pseudo-time {self._path.s:.6g}"
+        return "the way to pseudo-time 0"
+
+    def state(self) -> dict[str, Any]:
+        """All that the rest of the run hangs on, between two steps. Collective."""
+        state = {
+            "totals": self.totals,
+            "since": self._since,
+            "events": self.events,
+            "doubts": self.doubts,
+            "written": self._written,
+            "row": self.record.row,
+            "work": self.work.state(),
+        }
+        if self._path is not None:
+            return {**state, "path": self._path.state()}
+        assert self._rising is not None
+        path, work = self._rising
+        return {**state, "rise": {"path": path.state(), "work": work.state()}}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Let `go` go on from a state."""
+        self.totals, self._since = dict(state["totals"]), dict(state["since"])
+        self.events[:], self.doubts = state["events"], state["doubts"]
+        self._written, self.record.row = state["written"], dict(state["row"])
+        self.work.restore(state["work"])
+        self._restored = state
 
     def go(self) -> None:
         """To s = 1. Raises NoEquilibrium or Interrupted, with the last good state saved."""
         nothing = np.zeros((self.assembly.model.owned, 3))
-        self._write(0.0, self._x, nothing)
-        x = self._rise() if begins_loaded(self.assembly.model) else self._x.copy()
-        self.newton.set_pseudo_time(0.0)
+        if not self._restored:
+            self._write(0.0, self._x, nothing)
+        rises = begins_loaded(self.assembly.model) and "path" not in self._restored
+        x = self._rise() if rises else self._x.copy()
         length = 0.0 if self.spec.control == "arc_length" else None
-        self.work.start(0.0, *conjugates(self.assembly, x, self.newton.out_of_balance(x)), length)
-        path = (ArcLength if self.spec.control == "arc_length" else LoadPath)(
+        if "path" not in self._restored:
+            self.newton.set_pseudo_time(0.0)
+            self.work.start(0.0, *conjugates(self.assembly, x, self.newton.out_of_balance(x)), length)
+        self._path = path = (ArcLength if self.spec.control == "arc_length" else LoadPath)(
             self.newton,
             self.marks,
             self.spec.smallest_step,
@@ -84,6 +124,8 @@ class StaticRun:
             on_bifurcation=self.spec.on_bifurcation,
             on_event=self._on_event,
         )
+        if "path" in self._restored:
+            path.restore(self._restored["path"])
         try:
             path.run()
         except (NoEquilibrium, Interrupted):
@@ -102,6 +144,12 @@ class StaticRun:
         work, assembly = PathWork(model.drives, model.loads), rise.newton.assembly
         work.start(0.0, *conjugates(assembly, self._x, np.zeros((model.owned, 3))))
 
+        def begin(path: LoadPath) -> None:
+            self._rising = path, work
+            if "rise" in self._restored:
+                work.restore(self._restored["rise"]["work"])
+                path.restore(self._restored["rise"]["path"])
+
         def add(step: PathStep, x: PETSc.Vec) -> None:
             work.add(step.s, *conjugates(assembly, x, rise.newton.out_of_balance(x)))
             self._count(step)
@@ -111,6 +159,7 @@ class StaticRun:
                 RISE,
                 self.spec.smallest_step,
                 add,
+                begin,
                 interrupted=self.stop,
                 on_bifurcation=self.spec.on_bifurcation,
                 on_event=lambda event, x: self._on_event(

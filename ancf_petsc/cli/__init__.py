@@ -29,6 +29,7 @@ VERBS = {
     "plot": ("ancf_petsc.cli.plot", "draw the curves of runs"),
     "view": ("ancf_petsc.cli.view", "look at a run, or at a case before it runs"),
     "study": ("ancf_petsc.cli.study", "run a case with keys varied, tabulate errors and costs"),
+    "advise": ("ancf_petsc.cli.advise", "find the cheapest element, mesh and step within an error"),
     "info": ("ancf_petsc.cli.info", "versions, elements, self-check"),
     "modes": ("ancf_petsc.cli.modes", "natural frequencies and shapes of a case's body"),
     "mesh": ("ancf_petsc.cli.mesh", "make one of the project's meshes at a size"),
@@ -60,6 +61,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as leave:
         return leave.code if isinstance(leave.code, int) else int(leave.code is not None)
     except AncfError as error:
+        _end_others_unless_they_know(error)
         return _print_error(error)
     except ImportError as error:
         from ancf_petsc.cli.packages import import_problem
@@ -84,6 +86,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if rank_count() == 1:
             raise
         sys.excepthook(*sys.exc_info())
+        print(f"error: rank {rank()}: {sys.exc_info()[1]!r}", file=sys.stderr, flush=True)
         _abort_others(1)
         return 1
     return code
@@ -217,6 +220,18 @@ def _print_error(error: AncfError) -> int:
 def _mpi() -> Any:
     """mpi4py.MPI if this process has started MPI."""
     return sys.modules.get("mpi4py.MPI")
+
+
+def _end_others_unless_they_know(error: AncfError) -> None:
+    """Errors of this program are raised on all ranks. One that is raised on this rank alone leaves the others waiting for it."""
+    mpi = _mpi()
+    if rank_count() == 1 or mpi is None:
+        return
+    from ancf_petsc.parallel.exchange import all_meet
+
+    if not all_meet(mpi.COMM_WORLD):
+        print(f"error: rank {rank()}, alone: {error}", file=sys.stderr, flush=True)
+        _abort_others(error.exit_code)
 
 
 def _abort_others(code: int) -> None:

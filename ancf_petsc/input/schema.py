@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from ancf_petsc.axes import AXES
 from ancf_petsc.input.analysis import (
@@ -18,6 +18,7 @@ from ancf_petsc.input.analysis import (
     InitialSpec,
     StaticsSpec,
 )
+from ancf_petsc.input.interval import EXPECTED, checked
 from ancf_petsc.input.loads import ForceSpec, GravitySpec, LoadSpec
 from ancf_petsc.input.types import (
     Axes,
@@ -186,6 +187,7 @@ class OutputSpec(Table):
 
     symmetry: float = key("a number > 0; 4 for a quarter of the body", 1.0, gt=0)
     curve: CurveSpec | None = key('a table; such as { force = "top.z", stroke = "top.z" }', None)
+    checkpoint: Annotated[str, AfterValidator(checked)] = key(f'{EXPECTED}; such as "10 min"', "10 min")
 
 
 class ProbeSpec(Table):

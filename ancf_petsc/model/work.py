@@ -8,6 +8,7 @@ polynomials through the last accepted states: over the displacement a force is s
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,21 @@ class PathWork:
         self._before = 0.0
         self._settled = False
         self._states: list[tuple[float, NDArray, NDArray, float | None]] = []
+
+    def state(self) -> dict[str, Any]:
+        """The sum, and what goes on from."""
+        return {
+            "total": self.total,
+            "before": self._before,
+            "settled": self._settled,
+            "states": [list(state) for state in self._states],
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state."""
+        self.total, self._before = state["total"], state["before"]
+        self._settled = state["settled"]
+        self._states = [(s, reactions, seen, length) for s, reactions, seen, length in state["states"]]
 
     def start(
         self, s: float, reactions: NDArray, displacements: NDArray, length: float | None = None

@@ -46,6 +46,15 @@ class Equations:
         self._steady = all(load.ramp.kind == "constant" for load in model.loads)
         self._loads = assembly.external_force(0.0)
 
+    @property
+    def piece(self) -> int:
+        """Of the smooth pieces between corners the one that was entered last, from 0."""
+        return self._piece
+
+    @piece.setter
+    def piece(self, number: int) -> None:
+        self._piece = number
+
     # --- what is prescribed
 
     def loads(self, t: float) -> NDArray[np.float64]:

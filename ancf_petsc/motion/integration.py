@@ -50,6 +50,8 @@ class TimeIntegration:
         asked to stop.
         """
         for begin, end in pairwise(self.marks):
+            if end <= self.integrator.time:  # before a state that the motion goes on from
+                continue
             for goal in self._goals(begin, end):
                 while self.integrator.time < goal:
                     self._advance(goal)

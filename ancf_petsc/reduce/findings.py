@@ -43,6 +43,9 @@ class Finding:
     elements: int | None = None
     within: float = 0.0
 
+    def __str__(self) -> str:
+        return f"{self.sentence}: {self.how}" if self.how else self.sentence
+
 
 def findings(
     case: Case,

@@ -13,6 +13,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,11 @@ from petsc4py import PETSc
 
 from ancf_petsc.errors import Interrupted, NoEquilibrium
 from ancf_petsc.parallel.exchange import combined
+from ancf_petsc.parallel.fields import field
 from ancf_petsc.solve.critical import CLOSE, Watch
 from ancf_petsc.solve.cubic import crossing, cubic, extreme
 from ancf_petsc.solve.events import CriticalPoint, place_of
+from ancf_petsc.solve.extrapolation import filled
 from ancf_petsc.solve.load_path import LONGEST_FIRST_STEP, SAME_TIME, Marks, PathStep
 from ancf_petsc.solve.newton import Newton
 from ancf_petsc.solve.stability import why_it_ends
@@ -84,17 +87,19 @@ class ArcLength:
         self.on_bifurcation = on_bifurcation
         self.watch = Watch(newton)
         self.x, self.s = start or self.assembly.reference_vector(), 0.0
-        self._scale = 0.0
+        self._scale, self._steps = 0.0, 0
+        self._here: Point | None = None
         self._size = sqrt(2) * min(marks.after(0.0), LONGEST_FIRST_STEP)
 
     def run(self) -> None:
         """Raises NoEquilibrium where the path ends before s = 1, Interrupted when asked to stop."""
         try:
-            here = self._point(self.x.copy(), 0.0, None)
-            for _ in range(MOST_STEPS):
+            self._here = self._here or self._point(self.x.copy(), 0.0, None)
+            while self._steps < MOST_STEPS:
                 if self.interrupted():
                     raise Interrupted(f"stopped at pseudo-time {self.s:.6g}; everything up to here is saved")
-                here = self._advance(here)
+                self._here = self._advance(self._here)
+                self._steps += 1
                 if self.s == 1.0:
                     return
                 if self.s < -1.0:
@@ -102,6 +107,32 @@ class ArcLength:
             raise NoEquilibrium(f"{MOST_STEPS} steps by arc length did not lead to s = 1: {ASTRAY}", LOST)
         finally:
             self.watch.destroy()
+
+    def state(self) -> dict[str, Any]:
+        """All that the rest of the path hangs on, between two steps."""
+        here = self._here
+        assert here is not None
+        return {
+            "s": self.s,
+            "x": field(self.x),
+            "point": [field(here.x), here.s, field(here.direction), here.rate, here.length, here.negative],
+            "scale": self._scale,
+            "size": self._size,
+            "steps": self._steps,
+            "watch": self.watch.state(),
+            "newton": self.newton.state(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state. Collective."""
+        self.newton.restore(state["newton"])
+        x, s, direction, rate, length, negative = state["point"]
+        self._here = Point(filled(self.x, x), s, direction.ravel(), rate, length, negative)
+        self.x.array[:] = state["x"].ravel()
+        self.s, self._scale, self._size = state["s"], state["scale"], state["size"]
+        self._steps = state["steps"]
+        self.watch.restore(state["watch"])
+        self.newton.set_pseudo_time(self.s)
 
     # --- steps
 

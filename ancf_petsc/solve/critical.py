@@ -8,6 +8,7 @@ state itself.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from petsc4py import PETSc
 
@@ -50,6 +51,23 @@ class Watch:
     def destroy(self) -> None:
         """Free PETSc's objects."""
         self.lowest.destroy()
+
+    def state(self) -> dict[str, Any]:
+        """What was seen so far."""
+        return {
+            "lowest": self.lowest.state(),
+            "history": [list(seen) for seen in self.history],
+            "negative": self.negative,
+            "first": self._first,
+            "since": [self._spent, self._passed],
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state."""
+        self.lowest.restore(state["lowest"])
+        self.history = [(s, value) for s, value in state["history"]]
+        self.negative, self._first = state["negative"], state["first"]
+        self._spent, self._passed = state["since"]
 
     @property
     def stable(self) -> bool:

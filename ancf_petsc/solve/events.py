@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -14,8 +15,10 @@ from petsc4py import PETSc
 from ancf_petsc.errors import NoEquilibrium
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import combined
+from ancf_petsc.parallel.fields import field
 from ancf_petsc.solve.critical import Known, Watch
 from ancf_petsc.solve.descent import stable_neighbour
+from ancf_petsc.solve.extrapolation import filled
 
 ACROSS = 1e-4
 """Cosine between mode and loads below which the path goes on straight and another one branches off."""
@@ -109,6 +112,19 @@ class Crossing:
         if self._stable is not None:
             self._stable.x.destroy()
         self._stable = Known(s, x.copy(), self.watch.history[-1][1] if self.watch.history else np.inf)
+
+    def state(self) -> dict[str, Any]:
+        """What it knows between steps."""
+        known = self._stable
+        stable = None if known is None else [known.s, field(known.x), known.value]
+        return {"stable": stable, "followed": self._followed}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state."""
+        self._followed = state["followed"]
+        if state["stable"] is not None:
+            s, rows, value = state["stable"]
+            self._stable = Known(s, filled(self.newton.assembly.vector(), rows), value)
 
     def stop_if_asked(self) -> None:
         """Raise NoEquilibrium where the path was to end at a critical point, and has reached it."""

@@ -10,11 +10,13 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, isclose
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
 from ancf_petsc.errors import Interrupted
+from ancf_petsc.parallel.fields import field
 from ancf_petsc.solve.critical import Watch
 from ancf_petsc.solve.events import CriticalPoint, Crossing
 from ancf_petsc.solve.extrapolation import Extrapolation
@@ -106,6 +108,31 @@ class LoadPath:
         self._past = Extrapolation()
         self._past.add(0.0, self.x)
         self._step = min(marks.after(0.0), LONGEST_FIRST_STEP)
+
+    def state(self) -> dict[str, Any]:
+        """All that the rest of the path hangs on, between two steps."""
+        return {
+            "s": self.s,
+            "x": field(self.x),
+            "rate": self._rate,
+            "at_hand": self._at_hand,
+            "step": self._step,
+            "past": self._past.state(),
+            "watch": self.watch.state(),
+            "crossing": self._crossing.state(),
+            "newton": self.newton.state(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state. Collective."""
+        self.newton.restore(state["newton"])
+        self.s, self._rate, self._at_hand = state["s"], state["rate"], state["at_hand"]
+        self._step = state["step"]
+        self.x.array[:] = state["x"].ravel()
+        self._past.restore(state["past"], self.x)
+        self.watch.restore(state["watch"])
+        self._crossing.restore(state["crossing"])
+        self.newton.set_pseudo_time(self.s)
 
     def run(self) -> None:
         """Follow the path to s = 1. Raises NoEquilibrium where it ends, Interrupted when asked to stop."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.forcing import Forcing
 from ancf_petsc.solve.linear.solver import LinearSolver
-from ancf_petsc.solve.petsc import NOT_FINITE, default_options, is_given
+from ancf_petsc.solve.petsc import NOT_FINITE, default_options, is_given, keep_preconditioner
 from ancf_petsc.solve.step_control import StepControl
 
 log = logging.getLogger("ancf")
@@ -64,11 +65,12 @@ class Newton:
         self._snes, self._careful = self._create(), self._create()
         self._careful.setKSP(self._snes.getKSP())
         self.linear = LinearSolver(assembly, self.matrix, self._snes.getKSP())
-        # Preconditioners are renewed by hand, after each tangent: SNES itself does it the first time only.
+        # Preconditioners are renewed by hand, after each tangent, never by SNES.
         for snes, search in ((self._careful, CAREFUL), (self._snes, QUICK)):
             snes.setJacobian(self._tangent, self.linear.operator, self.matrix.mat)
-            with default_options({"snes_lag_preconditioner": -2, "snes_linesearch_type": search}):
+            with default_options({"snes_linesearch_type": search}):
                 snes.setFromOptions()
+            keep_preconditioner(snes)
         self.linear.read_options()
         self._predicting = 0
         self._forcing = Forcing(tolerance)
@@ -128,6 +130,30 @@ class Newton:
             linear=before + snes.getLinearSolveIterations(),
             residuals=tuple(self._residuals),
         )
+
+    def state(self) -> dict[str, Any]:
+        """What is carried from one solve to the next."""
+        return {
+            "curvature": self._forcing.curvature,
+            "term": self._term,
+            "largest_diagonal": self.matrix.largest_diagonal,
+            "linear": self.linear.state(),
+            "control": self.control.state(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state. Collective."""
+        x = self.assembly.vector()
+
+        def make(at: NDArray, shift: NDArray) -> None:
+            x.array[:] = at.ravel()
+            self.tangent_at(x, shift.ravel())
+
+        self.linear.restore(state["linear"], make)
+        x.destroy()
+        self.control.restore(state["control"])
+        self._forcing.curvature, self._term = state["curvature"], state["term"]
+        self.matrix.largest_diagonal = state["largest_diagonal"]
 
     def predict(self, x: PETSc.Vec, s: float, target: float) -> bool:
         """Move x from equilibrium at s by the tangent to `target`. Returns whether the linear solve succeeded."""
@@ -200,7 +226,7 @@ class Newton:
             self.matrix.add_diagonal(self._shift)
         self.assembly.add_tangent(x, self.matrix)
         self.matrix.finish()
-        self.linear.renew_if_tired(x)
+        self.linear.renew_if_tired(x, self._shift)
         self.linear.ask_for(self._term)
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:

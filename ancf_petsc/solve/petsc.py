@@ -154,6 +154,16 @@ def direct_package(prefix: str = "") -> str:
     return "mumps"
 
 
+def keep_preconditioner(snes: PETSc.SNES) -> None:
+    """Let SNES never make its preconditioner anew, unless an option speaks of it: petsc4py has no binding, PETSc's library does,
+    and its option refuses to say so from the start.
+    """
+    if not is_given("snes_lag_preconditioner"):
+        library = ctypes.CDLL(PETSc.__file__)
+        number = ctypes.c_int64 if np.dtype(PETSc.IntType).itemsize == 8 else ctypes.c_int32
+        library.SNESSetLagPreconditioner(ctypes.c_void_p(snes.handle), number(-1))
+
+
 def is_given(name: str) -> bool:
     """Whether the case or the command line says anything about an option. The question is no use of it."""
     return name in PETSc.Options().getAll()

@@ -43,11 +43,13 @@ class Rise:
         outputs: Sequence[float],
         smallest_step: float,
         on_step: Callable[[PathStep, PETSc.Vec], None] = lambda step, x: None,
+        begin: Callable[[LoadPath], None] = lambda path: None,
         **more,
     ) -> PETSc.Vec:
-        """The state at its end. Raises NoEquilibrium. Collective."""
+        """The state at its end. begin: sees the path before its first step. Raises NoEquilibrium. Collective."""
         path = LoadPath(self.newton, Marks.of(outputs, ()), smallest_step, on_step, **more)
         try:
+            begin(path)
             path.run()
         finally:
             self.newton.destroy()

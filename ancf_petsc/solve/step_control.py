@@ -40,6 +40,15 @@ class StepControl:
             self.note(entry["action"], f"{where}{entry['reason']}", entry[other.clock], **more)
         self.left_out += other.left_out
 
+    def state(self) -> dict[str, Any]:
+        """What was noted so far."""
+        return {"cuts": self.cuts, "left_out": self.left_out, "entries": self.entries}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state."""
+        self.cuts, self.left_out = state["cuts"], state["left_out"]
+        self.entries[:] = state["entries"]
+
     def facts(self) -> dict[str, Any]:
         """For the summary."""
         return {"cuts": self.cuts, "step_control": self.entries, "step_control_left_out": self.left_out}

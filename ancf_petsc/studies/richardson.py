@@ -81,7 +81,7 @@ def extrapolate(ladder: Ladder) -> LadderLimit:
         return LadderLimit(ASYMPTOTIC, words, None, float(q[-1]), noise, 0.0)
     if (steps[:-1] * steps[1:] <= 0).any():
         return _refused("values do not change in one direction from level to level")
-    triples = [_fitted(h[k : k + 3], q[k : k + 3]) for k in range(len(h) - 2)]
+    triples = [fitted_order(h[k : k + 3], q[k : k + 3]) for k in range(len(h) - 2)]
     problem = _problem(triples, ladder, h, stretch)
     if problem:
         return _refused(problem)
@@ -101,7 +101,7 @@ def _levels(ladder: Ladder) -> tuple[Floats, Floats, Floats | None]:
     return h[keep], q[keep], stretch
 
 
-def _fitted(h: Floats, q: Floats) -> tuple[float, float] | None:
+def fitted_order(h: Floats, q: Floats) -> tuple[float, float] | None:
     """Order and limit through three levels of any ratio; None where no order fits."""
     ratio = (q[0] - q[1]) / (q[1] - q[2])
 

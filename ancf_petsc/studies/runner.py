@@ -160,7 +160,8 @@ class Runner:
             reason = one_line(process.reason()) if code else ""
             process.end()
         self._active.remove(started)
-        alone = started.alone and started.load.left_alone(_used() - started.used, self.ranks)
+        used = _used() - started.used
+        alone = started.alone and started.load.left_alone(used, self.ranks)
         with started.lock:
             if code == CaseError.exit_code and ANOTHER in reason:
                 return True
@@ -173,6 +174,7 @@ class Runner:
                 limit=self.timeout,
                 wall=process.seconds,
                 alone=alone,
+                processor=used if started.alone else None,
                 seconds=None,
             )
         self._note(process)

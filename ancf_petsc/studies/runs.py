@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -57,13 +57,13 @@ def runs_of(study: Study, runs_folder: Path) -> list[StudyRun]:
     """
     found: dict[str, StudyRun] = {}
     for where, changes in combinations(study):
-        run = _named(study, changes, where)
+        run = run_of(study, changes, where)
         found.setdefault(run.name, replace(run, values=_values(study, changes)))
     for name, source in study.spec.reference.items():
         if source.kind == "run":
-            run = _named(study, source.changes, f"reference.{name}")
+            run = run_of(study, _with_common(study, source.changes), f"reference.{name}")
             found.setdefault(run.name, replace(run, in_table=False))
-    sized = [_sized(run, runs_folder) for run in _labelled(study, list(found.values()))]
+    sized = [sized_run(run, runs_folder) for run in _labelled(study, list(found.values()))]
     if all(run.facts is None for run in sized):
         raise CaseError(sized[0].problem)
     return sorted(sized, key=lambda run: (run.seconds, run.name))
@@ -82,18 +82,23 @@ def _labelled(study: Study, runs: list[StudyRun]) -> list[StudyRun]:
 
 
 def combinations(study: Study) -> Iterator[tuple[str, Changes]]:
-    """(where in the file, changes) of the product of [vary], then of each of [[rows]]."""
+    """(where in the file, changes) of the product of [vary], then of each of [[rows]]; those of [set] first."""
     spec = study.spec
     if spec.vary:
         for values in product(*spec.vary.values()):
-            yield "vary", tuple(zip(spec.vary, values, strict=True))
+            yield "vary", _with_common(study, zip(spec.vary, values, strict=True))
     for index, row in enumerate(spec.combinations):
-        yield f"rows.{index}", row
+        yield f"rows.{index}", _with_common(study, row)
+
+
+def _with_common(study: Study, changes: Iterable[tuple[str, Any]]) -> Changes:
+    return tuple({**study.spec.common, **dict(changes)}.items())
 
 
 def reference_run(study: Study, name: str) -> str:
     """The hash of the further run that is a quantity's reference."""
-    return _named(study, study.spec.reference[name].changes, f"reference.{name}").name
+    changes = _with_common(study, study.spec.reference[name].changes)
+    return run_of(study, changes, f"reference.{name}").name
 
 
 def _values(study: Study, changes: Changes) -> dict[str, Any]:
@@ -114,7 +119,7 @@ def _looked_up(data: Any, path: str) -> Any:
     return data
 
 
-def _named(study: Study, changes: Changes, where: str) -> StudyRun:
+def run_of(study: Study, changes: Changes, where: str) -> StudyRun:
     """A combination as a checked case with its hash."""
     label = f"{study.file}: {where}: {described(changes)}"
     try:
@@ -136,7 +141,7 @@ def _named(study: Study, changes: Changes, where: str) -> StudyRun:
     return StudyRun(tuple(changes), case, known.of_program(), known.hash, study.base.text)
 
 
-def _sized(run: StudyRun, runs_folder: Path) -> StudyRun:
+def sized_run(run: StudyRun, runs_folder: Path) -> StudyRun:
     """The run with its sizes, recorded or from its mesh."""
     recorded = read_record(runs_folder, run.name).get("facts")
     try:

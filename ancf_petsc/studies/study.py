@@ -67,7 +67,7 @@ def run_study(
         changed=writer.now_and_then,
         progress=progress,
     )
-    _compile(mine, place)
+    compile_missing(mine, place)
     try:
         runner.go(mine)
         if options.timing:
@@ -123,7 +123,7 @@ def _check_folder(folder: Path) -> None:
         raise CaseError("a run is in this folder", file=folder, key="--out", expected="a study's", cure=cure)
 
 
-def _compile(runs: Sequence[StudyRun], place: Path) -> None:
+def compile_missing(runs: Sequence[StudyRun], place: Path) -> None:
     """Compile what is missing once, before runs beside each other do it each for itself."""
     for run in runs:
         if read_record(place, run.name).get("code") == 0:

@@ -118,7 +118,7 @@ def draw_curves(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -
             predicted = draw_predicted(axes, panel)
             once = {line.label: line for line in panel.lines}
             labels.append((axes, [*end_labels(list(once.values()), look), *predicted]))
-        finish_chart(figure, title_of(study, chart), (chart.note, _ends(panels)))
+        finish_chart(figure, title_of(study, chart), (chart.note or study.note, _ends(panels)))
         write_labels(figure, labels)
     return figure
 

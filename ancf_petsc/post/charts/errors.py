@@ -51,7 +51,7 @@ def precision_panels(study: StudyTable, chart: ChartSpec) -> list[ChartPanel]:
                 error_point(row, quantity, row.number(column), alone=cost != "seconds" or row.alone)
                 for row in rows
             ]
-            panel.lines.append(ChartLine(label, points))
+            panel.lines.append(ChartLine(label, points, down=True))
         pareto(panel.lines)
         panels.append(panel)
     return [panel for panel in panels if panel.count > 1]
@@ -74,7 +74,7 @@ def draw_precision(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]
             figure,
             title_of(study, chart),
             (
-                chart.note,
+                chart.note or study.note,
                 reference_words(study, chart),
                 _front_words(panels),
                 HOLLOW if hollow else "",
@@ -115,7 +115,9 @@ def _front_words(panels: list[ChartPanel]) -> str:
 
 def reference_words(study: StudyTable, chart: ChartSpec) -> str:
     """What errors are against."""
-    reference = study.reference(str(chart.quantity))
+    facts, reference = study.quantities.get(str(chart.quantity), {}), study.reference(str(chart.quantity))
+    if facts.get("against"):
+        return f"Errors: {facts.get('reduce')} of the distance from the reference's series, over the same of that series."
     words = str(reference.get("words") or "")
     value, unit = reference.get("value"), study.quantities.get(str(chart.quantity), {}).get("unit") or ""
     if isinstance(value, int | float) and value:
@@ -186,7 +188,9 @@ def draw_convergence(study: StudyTable, chart: ChartSpec, panels: list[ChartPane
         figure, (axes,) = grid_of_panels(1, wide=6.4, high=4.2)
         failed = _draw_errors(axes, panels[0], look, relative=is_relative(study, chart))
         finish_chart(
-            figure, title_of(study, chart), (chart.note, reference_words(study, chart), failure_words(failed))
+            figure,
+            title_of(study, chart),
+            (chart.note or study.note, reference_words(study, chart), failure_words(failed)),
         )
         labels: list[EndLabel] = end_labels(panels[0].lines, look)
         write_labels(figure, [(axes, labels)])

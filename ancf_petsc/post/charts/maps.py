@@ -117,7 +117,9 @@ def draw_map(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -> F
         handles = [swatch(*COLOURS.get(name, OTHER), outcome_words(name)) for name in outcomes]
         figure.legend(handles=handles, loc="outside right upper")
         finish_chart(
-            figure, title_of(study, chart), (chart.note, _quantity_words(study, chart, numbers=numbers))
+            figure,
+            title_of(study, chart),
+            (chart.note or study.note, _quantity_words(study, chart, numbers=numbers)),
         )
         write_labels(figure, labels)
     return figure

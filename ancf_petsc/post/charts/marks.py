@@ -230,7 +230,9 @@ def plain_ticks(axes: Axes, values: Sequence[float]) -> None:
 
 def percent_ticks(axes: Axes) -> None:
     """Errors as parts of a hundred."""
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:.3g} %"))
+    axes.yaxis.set_major_formatter(
+        FuncFormatter(lambda value, _: f"{100 * value:.3g} %".replace("e-0", "e-"))
+    )
     low, high = axes.get_ylim()
     if high < 100 * low:
         axes.yaxis.set_minor_formatter(FuncFormatter(_percent_of_leading))

@@ -34,16 +34,20 @@ class ChartPoint:
 
 @dataclass
 class ChartLine:
-    """Points of one value of the key that makes lines. more: words after its label."""
+    """Points of one value of the key that makes lines. more: words after its label. down: joined from the largest y to the
+    smallest, as errors fall, not along x.
+    """
 
     label: str
     points: list[ChartPoint]
     more: str = ""
+    down: bool = False
 
     @property
     def shown(self) -> list[ChartPoint]:
-        """What has a place, in ascending x."""
-        return sorted((point for point in self.points if point.known), key=lambda point: point.x)
+        """What has a place, in the order in which it is joined."""
+        known = [point for point in self.points if point.known]
+        return sorted(known, key=lambda point: -point.y if self.down else point.x)
 
 
 @dataclass

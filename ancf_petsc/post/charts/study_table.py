@@ -56,7 +56,7 @@ class StudyRow:
 
 @dataclass(frozen=True)
 class StudyTable:
-    """keys: values of each varied key in the order of the study. quantities, orders: as in study.json."""
+    """keys: values of each varied key in the order of the study. quantities, orders: as in study.json; facts: all of it."""
 
     folder: Path
     title: str
@@ -67,6 +67,7 @@ class StudyTable:
     orders: list[dict[str, Any]] = field(default_factory=list)
     charts: list[ChartSpec] = field(default_factory=list)
     note: str = ""
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
     def is_numeric(self, key: str) -> bool:
         """Whether all values of a key or column are numbers; a code such as 3413, in quotes in the study, is none."""
@@ -104,10 +105,8 @@ def read_study(folder: str | Path) -> StudyTable:
             expected="title, axes, quantities and charts",
             cure="run ancf study again: finished runs are not repeated",
         ) from error
-    units = read_units(str(facts.get("units") or ""))
-    return StudyTable(
-        folder, title, units, keys, rows, quantities, orders, charts, str(facts.get("note") or "")
-    )
+    units, note = read_units(str(facts.get("units") or "")), str(facts.get("note") or "")
+    return StudyTable(folder, title, units, keys, rows, quantities, orders, charts, note, facts)
 
 
 def _facts(path: Path) -> dict[str, Any]:

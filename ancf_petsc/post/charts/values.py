@@ -80,7 +80,7 @@ def draw_values(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -
             predicted = draw_predicted(axes, panel)
             failed += draw_margin(axes, panel.lines, look)
             labels.append((axes, [*end_labels(panel.lines, look), *predicted]))
-        notes = (chart.note, failure_words(failed), _ends_words(ends))
+        notes = (chart.note or study.note, failure_words(failed), _ends_words(ends))
         finish_chart(figure, title_of(study, chart), notes)
         write_labels(figure, labels)
     return figure

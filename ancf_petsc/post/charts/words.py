@@ -92,8 +92,10 @@ def value_words(chart: ChartSpec, key: str, value: str) -> str:
     for name in (value, short):
         if name in chart.labels:
             return as_typed(chart.labels[name])
+    if re.fullmatch(r"\d{4}", value):  # a code of an element
+        return value
     try:
-        return f"{float(value):.4g}" if not re.fullmatch(r"\d{4}", value) else value
+        return re.sub(r"e([+-])0*", lambda sign: "e" + sign[1].strip("+"), f"{float(value):.4g}")
     except ValueError:
         if re.fullmatch(r"\[[\d,]+\]", short):
             return " x ".join(short[1:-1].split(","))
