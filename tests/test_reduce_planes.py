@@ -123,16 +123,15 @@ def test_a_cut_gives_sets_of_nodes_no_new_faces(tmp_path):
         tmp_path,
         groups={"low": {"plane": "z", "at": "min"}, "slab": slab, "section": {"plane": "x", "at": 1.0}},
         constraint=[{"group": "low", "fix": ["x", "y", "z"]}],
-        load=[
-            {"type": "force", "group": "slab", "total": [0.0, 0.0, 40.0]},
-            {"type": "force", "group": "section", "total": [0.0, 0.0, 25.0]},
-        ],
+        load=[{"type": "force", "group": "slab", "total": [0.0, 0.0, 40.0]}],
         probe=[{"name": "section", "group": "section"}],
         output={},
     )
     half, _ = smaller(case, "half-x", tmp_path / "half")
     whole, part = run(case, tmp_path / "a"), run(half, tmp_path / "b")
     np.testing.assert_allclose(part.probes["section.uz"], whole.probes["section.uz"], rtol=SAME)
+    with pytest.raises(CaseError, match="points in the plane of symmetry carry a force.*'points of section'"):
+        reduce(case.with_changes({"load.slab.group": "section"}), "half-x")
 
 
 def test_several_materials_and_quadratic_tetrahedra(tmp_path):

@@ -12,7 +12,7 @@ from ancf_petsc.axes import AXES
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input import toml
 from ancf_petsc.input.load import Case
-from ancf_petsc.mesh.groups import cells_of, parts_for_load, parts_for_support
+from ancf_petsc.mesh.groups import cells_of, parts_for_load, parts_for_support, surface_of
 from ancf_petsc.mesh.kinds import KINDS, part_kind, part_sizes
 from ancf_petsc.mesh.mesh import Group, Integers, Mesh
 from ancf_petsc.reduce.shape import CLOSE, Floats
@@ -40,7 +40,10 @@ class SmallerCase:
 
 
 def tables_and_mesh(case: Case, mesh: Mesh) -> SmallerCase:
-    """A case's tables on its own mesh: its groups are groups of the mesh, the elements of each material a group of their own."""
+    """A case's tables on its own mesh: its groups are groups of the mesh; what materials and forces take of them gets its own.
+
+    A set of nodes may be edges to a support and points to a force.
+    """
     data = deepcopy(toml.parse(case.text))
     data.pop("groups", None)
     groups = {name: Group(name, group.nodes, _parts_of(mesh, group)) for name, group in mesh.groups.items()}
@@ -51,6 +54,11 @@ def tables_and_mesh(case: Case, mesh: Mesh) -> SmallerCase:
             cells = mesh.cells[cells_of(mesh, group), : KINDS[mesh.kind].nodes]
             row["group"] = free_name(mesh, f"elements of {group.name}")
             groups[row["group"]] = Group(row["group"], np.unique(cells), {dimension: cells})
+    for load in data.get("load", []):
+        group = mesh.groups.get(load.get("group", ""))
+        if group is not None and not group.parts and not parts_for_load(mesh, group)[0]:
+            load["group"] = free_name(mesh, f"points of {group.name}")
+            groups[load["group"]] = Group(load["group"], group.nodes, {0: group.nodes[:, None]})
     return SmallerCase(data, replace(mesh, groups=groups))
 
 
@@ -122,6 +130,14 @@ def _halved(
     if on_plane > 0:
         within = total - (total @ plane.normal) * plane.normal
         beside, own = _split(smaller.mesh, group, plane, size, name)
+        if 0 in own.parts and surface_of(smaller.mesh, Group(own.name, own.nodes)) is not None:
+            raise CaseError(
+                "points in the plane of symmetry carry a force, and together they are faces of the part that is kept",
+                key="--to",
+                got=group,
+                expected="a force that is not on points of the whole plane",
+                cure="give the force to a surface or a line",
+            )
         smaller.mesh.groups |= {part.name: part for part in (beside, own)}
         if kept > 0:
             found[0]["group"] = beside.name
