@@ -12,7 +12,7 @@ from ancf_petsc.cli import main
 from ancf_petsc.mesh.check import statistics
 from ancf_petsc.plan.plan import make_plan
 from ancf_petsc.reduce.caps import nested
-from ancf_petsc.reduce.symmetry import MirrorPlane, Scene, mirror_planes, moments
+from ancf_petsc.reduce.symmetry import MirrorPlane, SceneModel, mirror_planes, moments
 from ancf_petsc.reduce.write import reduce, write_case
 
 SAME = 1e-9
@@ -218,7 +218,7 @@ def test_planes_of_a_body_askew(tmp_path):
         load=[{"type": "force", "group": "high", "total": (3.0 * rotation[:, 2]).tolist()}],
         output={},
     )
-    scene = Scene(case, make_plan(case))
+    scene = SceneModel(case, make_plan(case))
     assert scene.volume == pytest.approx(6.0)
     found = mirror_planes(scene)
     assert len(found) == 2
@@ -232,7 +232,7 @@ def test_planes_of_a_body_askew(tmp_path):
 def test_a_small_notch_breaks_the_symmetry_of_a_ring(tmp_path):
     """Chords of a coarse mesh are no asymmetry; a notch of their size is."""
     case = ring_case(tmp_path, notch=1.0)
-    scene = Scene(case, make_plan(case))
+    scene = SceneModel(case, make_plan(case))
     planes = [MirrorPlane(np.array([*CENTRE, 6.0]), normal) for normal in np.eye(3)[:2]]
     assert "no mirror image" in scene.why_not(planes[0])
     assert scene.why_not(planes[1]) == ""

@@ -16,12 +16,12 @@ from ancf_petsc.reduce.profile import profile_of
 from ancf_petsc.reduce.profile_lines import simplified, traced
 from ancf_petsc.reduce.profile_mesh import meshed
 from ancf_petsc.reduce.revolution import Ring, ring_of
-from ancf_petsc.reduce.symmetry import Scene
+from ancf_petsc.reduce.symmetry import SceneModel
 from ancf_petsc.reduce.write import reduce, write_case
 
 
 def scene_of(case):
-    return Scene(case, make_plan(case))
+    return SceneModel(case, make_plan(case))
 
 
 def area_of(mesh):

@@ -13,14 +13,14 @@ from ancf_petsc.mesh.groups import cells_of, parts_for_support
 from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.mesh.parts import outer_sides
 from ancf_petsc.plan.plan import Plan
-from ancf_petsc.reduce.shape import Floats, Shape, Surface, triangles
+from ancf_petsc.reduce.shape import BoundarySurface, Floats, Simplices, triangles
 
 SAME = 1e-9
 """Directions and amounts that differ by less than this times their largest are the same."""
 
 
 @dataclass(frozen=True)
-class Action:
+class SceneAction:
     """What a table of the case does, for messages by its key, on a shape.
 
     held (3, 3): projector onto the components that are prescribed. amount (3,): their displacement, or the force, at factor 1.
@@ -29,13 +29,13 @@ class Action:
 
     key: str
     kind: str
-    shape: Shape
+    shape: Simplices
     held: Floats
     amount: Floats
     ramp: object = None
     groups: tuple[str, ...] = ()
 
-    def same(self, other: Action, held: Floats, amount: Floats) -> bool:
+    def same(self, other: SceneAction, held: Floats, amount: Floats) -> bool:
         """Whether `other` does what this one becomes with `held` and `amount`."""
         scale = max(float(np.abs(amount).max()), float(np.abs(other.amount).max()))
         return (
@@ -45,12 +45,12 @@ class Action:
         )
 
 
-def actions_on_shapes(case: Case, plan: Plan, surface: Surface) -> list[Action]:
+def actions_on_shapes(case: Case, plan: Plan, surface: BoundarySurface) -> list[SceneAction]:
     """Supports, forces and materials."""
     return [*_supports(case, plan, surface), *_forces(case, plan, surface), *_materials(case, plan.mesh)]
 
 
-def _supports(case: Case, plan: Plan, surface: Surface) -> list[Action]:
+def _supports(case: Case, plan: Plan, surface: BoundarySurface) -> list[SceneAction]:
     """One for each group and ramp, and each dimension of what the group is meshed with."""
     by_group: dict[tuple[str, object], tuple[Floats, Floats]] = {}
     for row in case.spec.constraint:
@@ -60,13 +60,13 @@ def _supports(case: Case, plan: Plan, surface: Surface) -> list[Action]:
             i = AXES.index(axis)
             held[i, i], amount[i] = 1.0, row.move.get(axis, 0.0)
     return [
-        Action(f"constraint.{name}", "support", shape, held, amount, ramp, (name,))
+        SceneAction(f"constraint.{name}", "support", shape, held, amount, ramp, (name,))
         for (name, ramp), (held, amount) in by_group.items()
         for shape in _shapes_of_support(plan.mesh, surface, name)
     ]
 
 
-def _shapes_of_support(mesh: Mesh, surface: Surface, name: str) -> list[Shape]:
+def _shapes_of_support(mesh: Mesh, surface: BoundarySurface, name: str) -> list[Simplices]:
     """Faces, edges and points of a group, each kind a shape; nodes that belong to its faces or edges are no points."""
     slack, group = surface.at_nodes(), mesh.groups[name]
     parts = parts_for_support(mesh, group)
@@ -75,10 +75,10 @@ def _shapes_of_support(mesh: Mesh, surface: Surface, name: str) -> list[Shape]:
     kinds = [triangles(rows) if d == 2 else rows[:, :2] for d, rows in parts.items() if d in (1, 2)]
     if len(alone) and not any(d == 2 for d in parts):
         kinds.append(alone[:, None])
-    return [Shape(mesh.points[rows], slack[rows].max(axis=1)) for rows in kinds]
+    return [Simplices(mesh.points[rows], slack[rows].max(axis=1)) for rows in kinds]
 
 
-def targets(action: Action, others: list[Action], held: Floats, amount: Floats) -> list[Shape]:
+def targets(action: SceneAction, others: list[SceneAction], held: Floats, amount: Floats) -> list[Simplices]:
     """Shapes that an action, which does `held` and `amount` after a symmetry, may come to lie on.
 
     Supports that do the same are one, whatever groups they are in; each force is shared over its own group.
@@ -87,12 +87,12 @@ def targets(action: Action, others: list[Action], held: Floats, amount: Floats) 
     shapes = [o.shape for o in others if action.same(o, held, amount) and o.shape.corners.shape[1] == corners]
     if action.kind != "support" or len(shapes) < 2:
         return shapes
-    return [Shape(np.concatenate([s.corners for s in shapes]), np.concatenate([s.slack for s in shapes]))]
+    return [Simplices(np.concatenate([s.corners for s in shapes]), np.concatenate([s.slack for s in shapes]))]
 
 
-def _forces(case: Case, plan: Plan, surface: Surface) -> list[Action]:
+def _forces(case: Case, plan: Plan, surface: BoundarySurface) -> list[SceneAction]:
     return [
-        Action(
+        SceneAction(
             f"load.{number}",
             "force",
             surface.of_group(plan.mesh.groups[load.group]),
@@ -106,7 +106,7 @@ def _forces(case: Case, plan: Plan, surface: Surface) -> list[Action]:
     ]
 
 
-def _materials(case: Case, mesh: Mesh) -> list[Action]:
+def _materials(case: Case, mesh: Mesh) -> list[SceneAction]:
     """The regions of materials, where there are several."""
     found = []
     for row in case.spec.material if len(case.spec.material) > 1 else ():
@@ -114,10 +114,10 @@ def _materials(case: Case, mesh: Mesh) -> list[Action]:
             continue
         corners = mesh.cells[cells_of(mesh, mesh.groups[row.group])]
         sides = triangles(outer_sides(mesh.kind, corners, len(mesh.points)))
-        shape = Shape(mesh.points[sides], np.zeros(len(sides)))
+        shape = Simplices(mesh.points[sides], np.zeros(len(sides)))
         law = (row.law, row.young, row.poisson, row.density)
         found.append(
-            Action(
+            SceneAction(
                 f"material.{row.group}", "material", shape, np.zeros((3, 3)), np.zeros(3), law, (row.group,)
             )
         )

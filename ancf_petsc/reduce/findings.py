@@ -20,7 +20,7 @@ from ancf_petsc.reduce.half import HALVES, QUARTER
 from ancf_petsc.reduce.prism import prism_of
 from ancf_petsc.reduce.revolution import ring_of
 from ancf_petsc.reduce.section import LINEAR, reduced_to_section
-from ancf_petsc.reduce.symmetry import MirrorPlane, Scene, mirror_planes, place
+from ancf_petsc.reduce.symmetry import MirrorPlane, SceneModel, mirror_planes, place
 from ancf_petsc.results.reader import Results
 
 WITHIN = 0.01
@@ -69,7 +69,7 @@ def findings(
 
 
 def _of_shape(case: Case, plan: Plan) -> Iterator[Finding]:
-    scene = Scene(case, plan)
+    scene = SceneModel(case, plan)
     yield from _mirrors(scene)
     yield from _revolution(scene)
     found = prism_of(scene)
@@ -86,7 +86,7 @@ def _of_shape(case: Case, plan: Plan) -> Iterator[Finding]:
         )
 
 
-def _mirrors(scene: Scene) -> Iterator[Finding]:
+def _mirrors(scene: SceneModel) -> Iterator[Finding]:
     planes = mirror_planes(scene)
     aligned = [plane for plane in planes if plane.axis is not None]
     case, count = _name(scene.case), len(scene.mesh.cells)
@@ -121,7 +121,7 @@ def _joined(planes: list[MirrorPlane]) -> str:
     return " and ".join(plane.describe() for plane in planes)
 
 
-def _revolution(scene: Scene) -> Iterator[Finding]:
+def _revolution(scene: SceneModel) -> Iterator[Finding]:
     ring, _ = ring_of(scene)
     if ring is None:
         return

@@ -10,7 +10,7 @@ from ancf_petsc.mesh.kinds import KINDS, qualities
 from ancf_petsc.reduce.cut import crossing_cells, cut
 from ancf_petsc.reduce.remesh import remeshed
 from ancf_petsc.reduce.shape import CLOSE
-from ancf_petsc.reduce.symmetry import MirrorPlane, Scene
+from ancf_petsc.reduce.symmetry import MirrorPlane, SceneModel
 from ancf_petsc.reduce.tables import SmallerCase, free_name, halve, tables_and_mesh
 
 HALVES = {f"half-{axis}": i for i, axis in enumerate(AXES)}
@@ -19,7 +19,7 @@ POOR = 0.1
 """Mean ratio of an element that is worth a note."""
 
 
-def reduced_by_planes(scene: Scene, to: str) -> SmallerCase:
+def reduced_by_planes(scene: SceneModel, to: str) -> SmallerCase:
     """The part of a scene between its planes of symmetry. Raises CaseError where it is not symmetric, with the reason."""
     planes = [_plane(scene, i) for i in ([HALVES[to]] if to in HALVES else range(3))]
     why = [scene.why_not(plane) for plane in planes]
@@ -43,7 +43,7 @@ def reduced_by_planes(scene: Scene, to: str) -> SmallerCase:
     return smaller
 
 
-def _plane(scene: Scene, axis: int) -> MirrorPlane:
+def _plane(scene: SceneModel, axis: int) -> MirrorPlane:
     """The plane through the middle normal to an axis, its normal to the side of the curve's group."""
     normal = np.eye(3)[axis]
     plane = MirrorPlane(scene.centre, normal)
@@ -55,7 +55,7 @@ def _plane(scene: Scene, axis: int) -> MirrorPlane:
     return plane
 
 
-def _halve(scene: Scene, smaller: SmallerCase, planes: list[MirrorPlane]) -> None:
+def _halve(scene: SceneModel, smaller: SmallerCase, planes: list[MirrorPlane]) -> None:
     """Cut along faces of elements where all planes consist of such; else make a new mesh of what they leave."""
     named = [(plane, free_name(scene.mesh, f"symmetry_{AXES[plane.axis or 0]}")) for plane in planes]
     crossed = sum(crossing_cells(scene.mesh, plane) for plane in planes)

@@ -6,11 +6,11 @@ import numpy as np
 
 from ancf_petsc.reduce.actions import SAME, directions, targets
 from ancf_petsc.reduce.revolution import TURNS, walls_of
-from ancf_petsc.reduce.shape import CLOSE, Floats, Shape, departure
-from ancf_petsc.reduce.symmetry import Scene
+from ancf_petsc.reduce.shape import CLOSE, Floats, Simplices, departure
+from ancf_petsc.reduce.symmetry import SceneModel
 
 
-def prism_of(scene: Scene) -> tuple[int, float] | None:
+def prism_of(scene: SceneModel) -> tuple[int, float] | None:
     """The axis that a body is prismatic along, held at both ends, with nothing acting along it, and its length; else None."""
     points = scene.mesh.points[scene.mesh.used]
     for axis in range(3):
@@ -20,7 +20,7 @@ def prism_of(scene: Scene) -> tuple[int, float] | None:
     return None
 
 
-def _held_ends(scene: Scene, axis: int, low: float, high: float) -> set[str]:
+def _held_ends(scene: SceneModel, axis: int, low: float, high: float) -> set[str]:
     """Keys of the supports on both ends; empty where one has none."""
     levels: dict[str, float] = {}
     for action, plane in walls_of(scene):
@@ -32,7 +32,7 @@ def _held_ends(scene: Scene, axis: int, low: float, high: float) -> set[str]:
     return ends[0] | ends[1] if all(ends) else set()
 
 
-def _same_along(scene: Scene, axis: int, low: float, high: float) -> bool:
+def _same_along(scene: SceneModel, axis: int, low: float, high: float) -> bool:
     """Whether body and actions stay what they are when moved along an axis; what leaves the body is mirrored back into it."""
     if any(
         kind == "spin" or abs(vector[axis]) > SAME * np.abs(vector).max()
@@ -51,7 +51,7 @@ def _same_along(scene: Scene, axis: int, low: float, high: float) -> bool:
     facets = scene.surface.facets
     heights = scene.mesh.points[facets][..., axis]
     flat = np.ptp(heights, axis=1) <= CLOSE * scene.size
-    mantle = Shape(scene.mesh.points[facets[~flat]], scene.surface.slack[~flat])
+    mantle = Simplices(scene.mesh.points[facets[~flat]], scene.surface.slack[~flat])
     level = heights[flat].mean(axis=1)
     inner = (level > low + CLOSE * scene.size) & (level < high - CLOSE * scene.size)
     if inner.any():
@@ -65,7 +65,7 @@ def _same_along(scene: Scene, axis: int, low: float, high: float) -> bool:
     )
 
 
-def _maps(scene: Scene, shape: Shape, target: Shape, axis: int, low: float, high: float) -> bool:
+def _maps(scene: SceneModel, shape: Simplices, target: Simplices, axis: int, low: float, high: float) -> bool:
     points, slack = shape.samples
     for part in TURNS:
         moved: Floats = points.copy()

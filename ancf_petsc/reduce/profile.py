@@ -15,7 +15,7 @@ from ancf_petsc.mesh.mesh import Integers
 from ancf_petsc.mesh.parts import rows_in
 from ancf_petsc.reduce.revolution import WHOLE, Ring, on_walls
 from ancf_petsc.reduce.shape import CLOSE, Floats, triangles
-from ancf_petsc.reduce.symmetry import Scene
+from ancf_petsc.reduce.symmetry import SceneModel
 
 PLACES = np.linspace(0.31, 0.69, 39)
 """Parts of the sector at which it may be cut; the one farthest from all nodes is taken."""
@@ -35,7 +35,7 @@ class Profile:
     marks: dict[str, Integers] = field(default_factory=dict)
 
 
-def profile_of(scene: Scene, ring: Ring) -> Profile:
+def profile_of(scene: SceneModel, ring: Ring) -> Profile:
     """The section of a scene that is a sector of a ring."""
     return _Cut(scene, ring).profile()
 
@@ -46,7 +46,7 @@ class _Cut:
     radius, height, beyond (n,): of the mesh's points; the last is the angle from the half-plane, in (-pi, pi].
     """
 
-    def __init__(self, scene: Scene, ring: Ring) -> None:
+    def __init__(self, scene: SceneModel, ring: Ring) -> None:
         self.scene, self.ring, self.mesh = scene, ring, scene.mesh
         self.facets = scene.surface.facets[~on_walls(scene, ring)]
         self.radius, angle, self.height = ring.coordinates(self.mesh.points)

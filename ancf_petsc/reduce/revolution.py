@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ancf_petsc.reduce.actions import SAME, Action, directions, targets
-from ancf_petsc.reduce.shape import CLOSE, Floats, Shape, departure
-from ancf_petsc.reduce.symmetry import MirrorPlane, Scene, flat_normal, place
+from ancf_petsc.reduce.actions import SAME, SceneAction, directions, targets
+from ancf_petsc.reduce.shape import CLOSE, Floats, Simplices, departure
+from ancf_petsc.reduce.symmetry import MirrorPlane, SceneModel, flat_normal, place
 
 TURNS = (0.1180, 0.2639, 0.3820, 0.5279, 0.6459, 0.7639, 0.9098)
 """Parts of the sector by which a body is rotated to see whether it stays what it is; no two are in a simple ratio."""
@@ -54,7 +54,7 @@ class Ring:
         return self.point + radius[:, None] * flat + height[:, None] * self.axis
 
 
-def ring_of(scene: Scene) -> tuple[Ring | None, str]:
+def ring_of(scene: SceneModel) -> tuple[Ring | None, str]:
     """The ring that a scene is a sector of, and why it is not the one that is likeliest."""
     reasons = []
     for ring in _candidates(scene):
@@ -65,7 +65,7 @@ def ring_of(scene: Scene) -> tuple[Ring | None, str]:
     return None, next(iter(reasons), "there is no axis about which it could be one of revolution")
 
 
-def walls_of(scene: Scene) -> list[tuple[Action, MirrorPlane]]:
+def walls_of(scene: SceneModel) -> list[tuple[SceneAction, MirrorPlane]]:
     """Flat supports that hold exactly their normal: planes of symmetry of the body that the scene is a part of."""
     found = []
     for action in scene.actions:
@@ -79,7 +79,7 @@ def walls_of(scene: Scene) -> list[tuple[Action, MirrorPlane]]:
     return found
 
 
-def _candidates(scene: Scene) -> list[Ring]:
+def _candidates(scene: SceneModel) -> list[Ring]:
     """Axes where planes of symmetry meet; else in the only one, else through the middle: along axes and principal axes."""
     walls = walls_of(scene)
     found = []
@@ -101,7 +101,7 @@ def _candidates(scene: Scene) -> list[Ring]:
     return [ring for point, axis in found if (ring := _sector(scene, point, axis, walls)) is not None]
 
 
-def _directions(scene: Scene) -> list[Floats]:
+def _directions(scene: SceneModel) -> list[Floats]:
     """The axes, and the principal axis whose moment differs from two equal ones."""
     values, vectors = np.linalg.eigh(scene.inertia)
     odd = 0 if abs(values[2] - values[1]) < abs(values[1] - values[0]) else 2
@@ -111,7 +111,7 @@ def _directions(scene: Scene) -> list[Floats]:
 
 
 def _sector(
-    scene: Scene, point: Floats, axis: Floats, walls: list[tuple[Action, MirrorPlane]]
+    scene: SceneModel, point: Floats, axis: Floats, walls: list[tuple[SceneAction, MirrorPlane]]
 ) -> Ring | None:
     """The ring about an axis with the planes of symmetry that contain it; None where they are more than two."""
     axis = axis * np.sign(axis[np.abs(axis).argmax()])
@@ -145,13 +145,13 @@ def _sector(
     return None
 
 
-def _way(shape: Shape, point: Floats, axis: Floats) -> Floats:
+def _way(shape: Simplices, point: Floats, axis: Floats) -> Floats:
     """From the axis to the middle of a shape, across the axis (3,)."""
     arm = shape.corners.reshape(-1, 3).mean(axis=0) - point
     return arm - (arm @ axis) * axis
 
 
-def why_no_ring(scene: Scene, ring: Ring) -> str:
+def why_no_ring(scene: SceneModel, ring: Ring) -> str:
     """Why a scene is not one of revolution about an axis; empty if it is."""
     for key, vector, kind in directions(scene.case):
         if kind == "spin":
@@ -166,13 +166,13 @@ def why_no_ring(scene: Scene, ring: Ring) -> str:
     )
 
 
-def acting_on(scene: Scene, ring: Ring) -> list[Action]:
+def acting_on(scene: SceneModel, ring: Ring) -> list[SceneAction]:
     """What acts on a scene beside the planes of symmetry that bound the sector."""
     walls = {id(action) for action, _ in walls_of(scene) if action.key in ring.walls}
     return [action for action in scene.actions if id(action) not in walls]
 
 
-def _differs(ring: Ring, action: Action) -> str:
+def _differs(ring: Ring, action: SceneAction) -> str:
     """Why what acts differs around the axis."""
     name = " and ".join(action.groups)
     turn = np.cross(np.eye(3), ring.axis)
@@ -183,7 +183,7 @@ def _differs(ring: Ring, action: Action) -> str:
     return ""
 
 
-def _moves(scene: Scene, ring: Ring, acting: list[Action]) -> str:
+def _moves(scene: SceneModel, ring: Ring, acting: list[SceneAction]) -> str:
     """Why a shape is not what it was after a rotation."""
     checks = [("the surface", outside(scene, ring), scene.surface.shape)]
     for action in acting:
@@ -199,7 +199,7 @@ def _moves(scene: Scene, ring: Ring, acting: list[Action]) -> str:
     return ""
 
 
-def on_walls(scene: Scene, ring: Ring) -> NDArray[np.bool_]:
+def on_walls(scene: SceneModel, ring: Ring) -> NDArray[np.bool_]:
     """(t,) which facets of the surface lie on the planes that bound the sector."""
     found = np.zeros(len(scene.surface.facets), bool)
     for action, plane in walls_of(scene):
@@ -209,7 +209,7 @@ def on_walls(scene: Scene, ring: Ring) -> NDArray[np.bool_]:
     return found
 
 
-def outside(scene: Scene, ring: Ring) -> Shape:
+def outside(scene: SceneModel, ring: Ring) -> Simplices:
     """The surface without what lies on the planes that bound the sector."""
     kept = ~on_walls(scene, ring)
-    return Shape(scene.mesh.points[scene.surface.facets[kept]], scene.surface.slack[kept])
+    return Simplices(scene.mesh.points[scene.surface.facets[kept]], scene.surface.slack[kept])

@@ -14,7 +14,7 @@ from ancf_petsc.reduce.profile_lines import simplified
 from ancf_petsc.reduce.profile_mesh import meshed
 from ancf_petsc.reduce.revolution import Ring, acting_on, ring_of
 from ancf_petsc.reduce.shape import CLOSE
-from ancf_petsc.reduce.symmetry import Scene
+from ancf_petsc.reduce.symmetry import SceneModel
 from ancf_petsc.reduce.tables import SmallerCase, tables_and_mesh
 
 LINEAR = "2312"
@@ -23,7 +23,7 @@ OTHERWISE = "2-6-1-2"
 """The element of the section for that of the body."""
 
 
-def reduced_to_section(scene: Scene, size: float | None) -> SmallerCase:
+def reduced_to_section(scene: SceneModel, size: float | None) -> SmallerCase:
     """The axisymmetric case. size: length of edges, that of the body's by default. Raises CaseError where there is no axis."""
     ring, why = ring_of(scene)
     if ring is None:
@@ -48,7 +48,7 @@ def axes_of_section(ring: Ring) -> tuple[int, int]:
     return (1 if axial == 0 else 0), axial
 
 
-def _fill_tables(smaller: SmallerCase, scene: Scene, ring: Ring, radial: int, axial: int) -> None:
+def _fill_tables(smaller: SmallerCase, scene: SceneModel, ring: Ring, radial: int, axial: int) -> None:
     data, spec = smaller.data, scene.case.spec
     data["title"] = f"{data['title']}, section"
     data["mesh"] = {"element": ELEMENTS.get(spec.mesh.element, OTHERWISE)}
@@ -73,7 +73,7 @@ def _fill_tables(smaller: SmallerCase, scene: Scene, ring: Ring, radial: int, ax
             del data[key]
 
 
-def _supports(scene: Scene, ring: Ring, radial: int, axial: int) -> list[dict[str, Any]]:
+def _supports(scene: SceneModel, ring: Ring, radial: int, axial: int) -> list[dict[str, Any]]:
     """What the supports hold and move along the radius and the axis; those on the planes of the sector are no longer needed."""
     across = np.linalg.svd(ring.axis[None])[2][1]
     rows = []

@@ -28,7 +28,7 @@ BLOCK = MOST_PAIRS // NEAREST
 
 
 @dataclass(frozen=True)
-class Shape:
+class Simplices:
     """Parts (m, 1 to 3, 3): corners of triangles, segments or points. slack (m,): what the chords of each may leave out."""
 
     corners: Floats
@@ -59,7 +59,7 @@ def normals(points: Floats, facets: Integers) -> Floats:
     return across / np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
 
 
-class Surface:
+class BoundarySurface:
     """The boundary of a solid mesh: facets (t, 3), indices of points, counterclockwise from outside; normals (t, 3), slack (t,)."""
 
     def __init__(self, mesh: Mesh) -> None:
@@ -72,9 +72,9 @@ class Surface:
         self.slack = at_nodes[self.facets].max(axis=1)
 
     @property
-    def shape(self) -> Shape:
+    def shape(self) -> Simplices:
         """All of it."""
-        return Shape(self.mesh.points[self.facets], self.slack)
+        return Simplices(self.mesh.points[self.facets], self.slack)
 
     def _slack(self) -> Floats:
         edges = np.stack([self.facets, np.roll(self.facets, -1, axis=1)], axis=-1).reshape(-1, 2)
@@ -103,16 +103,16 @@ class Surface:
             np.maximum.at(found, self.facets[:, k], slack)
         return found
 
-    def of_group(self, group: Group) -> Shape:
+    def of_group(self, group: Group) -> Simplices:
         """What a load or a support of a group takes of it: faces, else edges, else points."""
         dimension, parts = parts_for_load(self.mesh, group)
         if dimension == 3:
             dimension, parts = 0, group.nodes
         parts = triangles(parts) if dimension == 2 else parts.reshape(len(parts), -1)[:, :2]
-        return Shape(self.mesh.points[parts], self.at_nodes()[parts].max(axis=1, initial=0.0))
+        return Simplices(self.mesh.points[parts], self.at_nodes()[parts].max(axis=1, initial=0.0))
 
 
-def departure(points: Floats, slack: Floats, target: Shape, size: float) -> tuple[float, int]:
+def departure(points: Floats, slack: Floats, target: Simplices, size: float) -> tuple[float, int]:
     """How far points (k, 3) lie off a shape beyond the slack of both, relative to `size`, at most, and which point does."""
     if not len(target):
         return np.inf, 0
@@ -131,13 +131,13 @@ def departure(points: Floats, slack: Floats, target: Shape, size: float) -> tupl
     return float(excess[worst]) / size, worst
 
 
-def _candidates(points: Floats, target: Shape) -> Integers:
+def _candidates(points: Floats, target: Simplices) -> Integers:
     count = min(NEAREST, len(target))
     _, found = cKDTree(target.corners.mean(axis=1)).query(points, k=count)
     return found.reshape(len(points), count)
 
 
-def _excess(points: Floats, slack: Floats, target: Shape, candidates: Integers) -> Floats:
+def _excess(points: Floats, slack: Floats, target: Simplices, candidates: Integers) -> Floats:
     distance = _distances(points[:, None], target.corners[candidates])
     return (distance - target.slack[candidates]).min(axis=1) - slack
 

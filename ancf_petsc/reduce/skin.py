@@ -11,7 +11,7 @@ from ancf_petsc.mesh.groups import parts_for_load, parts_for_support
 from ancf_petsc.mesh.mesh import Integers, Mesh
 from ancf_petsc.mesh.parts import rows_in, unique_rows
 from ancf_petsc.reduce.caps import cap
-from ancf_petsc.reduce.shape import CLOSE, CREASE, Floats, Surface, normals, triangles
+from ancf_petsc.reduce.shape import CLOSE, CREASE, BoundarySurface, Floats, normals, triangles
 from ancf_petsc.reduce.symmetry import MirrorPlane
 
 SNAP = 0.45
@@ -39,7 +39,7 @@ class Skin:
 
 def skin_of(mesh: Mesh) -> Skin:
     """The boundary of a mesh with its groups: as the faces a support or a load takes, else as lines, else as nodes."""
-    surface = Surface(mesh)
+    surface = BoundarySurface(mesh)
     skin = Skin(mesh.points.copy(), surface.facets)
     for name, group in mesh.groups.items():
         parts = dict(group.parts)

@@ -11,8 +11,8 @@ from ancf_petsc.input.load import Case
 from ancf_petsc.mesh.kinds import KINDS, part_sizes
 from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.plan.plan import Plan
-from ancf_petsc.reduce.actions import SAME, Action, actions_on_shapes, directions, targets
-from ancf_petsc.reduce.shape import CLOSE, Floats, Shape, Surface, departure
+from ancf_petsc.reduce.actions import SAME, SceneAction, actions_on_shapes, directions, targets
+from ancf_petsc.reduce.shape import CLOSE, BoundarySurface, Floats, Simplices, departure
 
 DISTINCT = 1e-3
 """Principal moments that differ by less than this times the largest have no axes of their own."""
@@ -54,12 +54,12 @@ class MirrorPlane:
         return f"({', '.join(f'{c:.4g}' for c in np.round(self.normal, 9) + 0.0)}) . x = {level:.6g}"
 
 
-class Scene:
+class SceneModel:
     """A case on its mesh, with what symmetries are looked for in: its surface, what acts on it, its middle and principal axes."""
 
     def __init__(self, case: Case, plan: Plan) -> None:
         self.case, self.plan, self.mesh = case, plan, plan.mesh
-        self.surface = Surface(plan.mesh)
+        self.surface = BoundarySurface(plan.mesh)
         self.actions = actions_on_shapes(case, plan, self.surface)
         self.volume, middle, self.inertia = moments(plan.mesh)
         self.centre = self._neat(middle)
@@ -89,14 +89,14 @@ class Scene:
             return f"its middle, {place(self.centre)}, is not on the plane"
         return self._off(plane, self.surface.shape, self.surface.shape, "the surface")
 
-    def _off(self, plane: MirrorPlane, shape: Shape, target: Shape, what: str) -> str:
+    def _off(self, plane: MirrorPlane, shape: Simplices, target: Simplices, what: str) -> str:
         points, slack = shape.samples
         worst, which = departure(plane.image(points), slack, target, self.size)
         if worst <= CLOSE:
             return ""
         return f"{what} at {place(points[which])} has no mirror image: it lies off by {worst * self.size:.3g}"
 
-    def _unmatched(self, plane: MirrorPlane, action: Action) -> str:
+    def _unmatched(self, plane: MirrorPlane, action: SceneAction) -> str:
         held, amount = plane.matrix @ action.held @ plane.matrix, plane.matrix @ action.amount
         partners = targets(action, self.actions, held, amount)
         name = " and ".join(action.groups)
@@ -133,12 +133,12 @@ def moments(mesh: Mesh) -> tuple[float, Floats, Floats]:
     return volume, centre, second / 20.0
 
 
-def mirror_planes(scene: Scene) -> list[MirrorPlane]:
+def mirror_planes(scene: SceneModel) -> list[MirrorPlane]:
     """Planes about which the scene is symmetric, those normal to axes first."""
     return [plane for plane in candidates(scene) if not scene.why_not(plane)]
 
 
-def candidates(scene: Scene) -> list[MirrorPlane]:
+def candidates(scene: SceneModel) -> list[MirrorPlane]:
     """Planes through the middle that are worth a look: normal to axes, to principal axes, to flat supports, and between these."""
     values, vectors = np.linalg.eigh(scene.inertia)
     gaps = np.abs(values[:, None] - values) + np.eye(3) * values.max()
@@ -158,7 +158,7 @@ def candidates(scene: Scene) -> list[MirrorPlane]:
     ]
 
 
-def flat_normal(shape: Shape) -> Floats | None:
+def flat_normal(shape: Simplices) -> Floats | None:
     """The normal of a shape that lies in a plane."""
     points = shape.corners.reshape(-1, 3)
     if shape.corners.shape[1] < 3:

@@ -10,7 +10,7 @@ from ancf_petsc.plan.plan import Plan, make_plan
 from ancf_petsc.reduce.half import HALVES, QUARTER, reduced_by_planes
 from ancf_petsc.reduce.mesh_file import write_mesh
 from ancf_petsc.reduce.section import reduced_to_section
-from ancf_petsc.reduce.symmetry import Scene
+from ancf_petsc.reduce.symmetry import SceneModel
 from ancf_petsc.reduce.tables import SmallerCase
 
 MESH_FILE = "mesh.msh"
@@ -33,7 +33,7 @@ def reduce(case: Case, to: str, size: float | None = None) -> SmallerCase:
             got=plan.element.code,
             expected="a solid element",
         )
-    scene = Scene(case, plan)
+    scene = SceneModel(case, plan)
     return reduced_to_section(scene, size) if to == SECTION else reduced_by_planes(scene, to)
 
 
