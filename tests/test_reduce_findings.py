@@ -116,3 +116,13 @@ def test_of_inertia_in_a_run(tmp_path, duration, matters):
     assert inertia.within >= kinetic.max() / max(strain.max(), np.abs(results.curve["external_work"]).max())
     assert ("statics does" in inertia.sentence) == (not matters)
     assert ("inertia matters" in inertia.sentence) == matters
+
+
+def test_advice_begins_with_them(project):
+    """As sentences with their commands, for the stroke that is asked for."""
+    from ancf_petsc.advise.advise import scene_findings
+    from ancf_petsc.advise.question import read_quantity
+
+    said = scene_findings(load_case(project / "cases" / "pvc_block"), read_quantity("force@stroke=0.010"))
+    assert any(line.endswith("cases/pvc_block --to section") for line in said)
+    assert "--set constraint.top.move.z=-0.01" in "\n".join(said)
