@@ -14,6 +14,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+SHORT, LONG = 300, 1200
+"""Letters of a word of the input that a message repeats, and of a list of what there is."""
+
 
 class AncfError(Exception):
     """Base of all errors a user can meet. `exit_code` is what the command line returns."""
@@ -48,15 +51,15 @@ class CaseError(AncfError):
         super().__init__(problem, file, key, got, expected, cure)
 
     def __str__(self) -> str:
-        where = [str(part) for part in (self.file, self.key) if part]
+        where = [shortened(str(part), LONG) for part in (self.file, self.key) if part]
         facts = []
         if self.got is not None:
-            facts.append(f"found {self.got!r}")
+            facts.append(f"found {shortened(_shown(self.got), SHORT)}")
         if self.expected:
-            facts.append(f"expected {self.expected}")
-        middle = [part for part in (self.problem, ", ".join(facts)) if part]
+            facts.append(f"expected {shortened(self.expected, LONG)}")
+        middle = [part for part in (shortened(self.problem, LONG), ", ".join(facts)) if part]
         line = ": ".join(where + middle)
-        return f"{line}; {self.cure}" if self.cure else line
+        return f"{line}; {shortened(self.cure, LONG)}" if self.cure else line
 
     def __reduce__(self) -> tuple:
         """Errors travel between ranks by pickle, keyword arguments included."""
@@ -101,12 +104,25 @@ class Interrupted(AncfError):
     exit_code = 130
 
 
+def shortened(text: str, most: int) -> str:
+    """A text of `most` letters and what is left out, where it is longer: inputs may hold lines without end."""
+    return text if len(text) <= most else f"{text[:most]} ... ({len(text)} letters)"
+
+
+def _shown(value: object) -> str:
+    """repr, also of a whole number with more digits than Python writes and of what is nested too deep."""
+    try:
+        return repr(value)
+    except (ValueError, RecursionError) as error:
+        return f"{type(value).__name__} ({error})"
+
+
 def did_you_mean(word: str, known: list[str] | tuple[str, ...]) -> str:
     """A cure for a misspelt word: the nearest known one, or the list of all."""
     close = [name for name in known if name.casefold() == word.casefold()] or get_close_matches(
         word, known, n=1
     )
-    listing = ", ".join(known) if known else "none"
+    listing = shortened(", ".join(known), LONG // 2) if known else "none"
     return f"did you mean {close[0]!r}? (there are: {listing})" if close else f"there are: {listing}"
 
 

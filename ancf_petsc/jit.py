@@ -13,9 +13,11 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from types import CodeType, FunctionType
@@ -60,14 +62,26 @@ def source_hash() -> str:
     return digest.hexdigest()[:16]
 
 
+def _is_own(folder: Path) -> bool:
+    """Make a folder in the place for temporary files; whether it is this user's alone: numba unpickles what lies there."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.lstat()
+    except OSError:
+        return False
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
+
+
 def cache_folder() -> Path:
-    """The folder for machine code: the first of these that can be written to."""
+    """The folder for machine code: the first of these that can be written to; else one for this process alone."""
     base = os.environ.get("ANCF_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     candidates = [
         Path(base) if base else Path.home() / ".cache",
         Path(tempfile.gettempdir()) / f"cache-{os.getuid()}",
     ]
     for candidate in candidates:
+        if candidate is candidates[1] and not _is_own(candidate):
+            continue
         folder = candidate / "ancf_petsc" / f"kernels-{source_hash()}"
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -75,6 +89,8 @@ def cache_folder() -> Path:
             continue
         if os.access(folder, os.W_OK):
             return folder
+    with suppress(OSError):
+        return Path(tempfile.mkdtemp(prefix="ancf-cache-"))
     return candidates[-1]
 
 

@@ -30,6 +30,7 @@ class ShippedStudy(NamedTuple):
 
 STUDIES = (
     ShippedStudy("pvc_block/accuracy", timed=True),
+    ShippedStudy("pvc_block/revolution", timed=True),
     ShippedStudy("cantilever/accuracy", timed=True),
     ShippedStudy("pendulum/accuracy", timed=True),
     ShippedStudy("stiff_pendulum/stability"),

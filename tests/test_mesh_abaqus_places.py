@@ -306,7 +306,7 @@ def test_copied_nodes_are_turned(tmp_path):
 MADE = {
     "nodes that are not there": ("*NGEN\n7, 999, 1", "node 999 is not there yet"),
     "a step that does not divide": ("*NGEN\n7, 13, 4", "a data line: found '7, 13, 4', expected first < last, and a step"),
-    "too many": ("*NGEN\n7, 999999999999", "makes more nodes or elements than fit"),
+    "too many": ("*NGEN\n7, 999999999999", "makes more nodes than fit: found 999999999992, expected at most 5000000 in a deck"),
     "sets of other sizes": ("*NSET, NSET=a\n7\n*NFILL\na, top, 3, 1", r"the two sets: found \[1, 4\], expected equally many"),
     "no set": ("*NFILL\na, top, 3, 1", "there is no node set of this name: found 'a'"),
     "an order": ("*NSET, NSET=u, UNSORTED\n10, 7\n*NFILL\nu, u, 2, 1", "the set u is UNSORTED, which is not read here"),

@@ -130,9 +130,11 @@ def test_files_that_are_no_exodus_and_a_missing_package(tmp_path, monkeypatch):
         data.createDimension("x", 1)
     with pytest.raises(MeshError, match=r"not a mesh of Exodus \(KeyError: 'num_nodes'\)"):
         read_mesh(path, ("tetra",))
-    monkeypatch.setitem(__import__("sys").modules, "netCDF4", None)
+    (tmp_path / "netCDF4.py").write_text("raise ImportError('not installed')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     with pytest.raises(
-        EnvironmentProblem, match="Exodus files need netCDF4 .*; install it: pip install netCDF4"
+        EnvironmentProblem,
+        match=r"netCDF4 cannot be loaded \(not installed\); install it: pip install netCDF4",
     ):
         read_mesh(path, ("tetra",))
 

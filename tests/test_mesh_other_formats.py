@@ -6,6 +6,9 @@ import pytest
 from tiny_meshes import CORNERS
 
 from ancf_petsc.errors import MeshError
+from ancf_petsc.mesh import meshio_file
+from ancf_petsc.mesh.foreign import by_meshio
+from ancf_petsc.mesh.foreign.wire import decode, encode
 from ancf_petsc.mesh.read import read_mesh
 
 # meshio's writer of MED calls functions numpy is about to drop.
@@ -13,6 +16,21 @@ pytestmark = pytest.mark.filterwarnings("ignore:.product. is deprecated:Deprecat
 
 TETS = np.array([(0, 1, 2, 3), (1, 2, 3, 4)])
 FACES = np.array([(0, 2, 1), (0, 1, 3)])
+
+
+@pytest.fixture
+def hands_over(monkeypatch):
+    """hands_over(mesh): meshio's reader, in this process, gives this mesh."""
+
+    def enter(mesh):
+        monkeypatch.setattr(meshio, "read", lambda path: mesh)
+        monkeypatch.setattr(
+            meshio_file,
+            "contents",
+            lambda path, reader: decode(b"".join(encode(by_meshio.contents(path, [])))),
+        )
+
+    return enter
 
 
 def body(**options) -> meshio.Mesh:
@@ -156,19 +174,19 @@ class Foreign:
         ({"points": np.array(CORNERS) * np.nan}, "5 nodes have coordinates that are not finite"),
     ],
 )
-def test_what_meshio_hands_over_is_checked(tmp_path, monkeypatch, changes, message):
+def test_what_meshio_hands_over_is_checked(tmp_path, hands_over, changes, message):
     path = tmp_path / "m.vtu"
     path.write_text("as meshio likes it")
-    monkeypatch.setattr(meshio, "read", lambda path: Foreign(**changes))
+    hands_over(Foreign(**changes))
     with pytest.raises(MeshError, match=message):
         read_mesh(path, ("tetra",))
 
 
-def test_cells_with_other_than_their_number_of_nodes(tmp_path, monkeypatch):
+def test_cells_with_other_than_their_number_of_nodes(tmp_path, hands_over):
     cells = [meshio.CellBlock("tetra", TETS)]
     cells[0].data = np.hstack([TETS, TETS[:, :1]])
     (tmp_path / "m.vtu").write_text("as meshio likes it")
-    monkeypatch.setattr(meshio, "read", lambda path: Foreign(cells=cells))
+    hands_over(Foreign(cells=cells))
     with pytest.raises(MeshError, match="2 tetra cells with 5 nodes: expected 4 nodes"):
         read_mesh(tmp_path / "m.vtu", ("tetra",))
 

@@ -19,7 +19,8 @@ def test_the_example_is_a_study():
     spec = check_study(tomllib.loads(text), Path("study.toml"))
     assert spec.combinations
     assert spec.reference["force"].kind == "richardson"
-    assert spec.keys[0] == "mesh.file"
+    assert spec.keys == ("mesh.element", "mesh.size")
+    assert spec.common["mesh.file"] == ""
 
 
 def test_every_key_column_and_ladder_is_described():

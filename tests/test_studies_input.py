@@ -138,6 +138,28 @@ mesh.divisions = [2, 1, 1]
     assert {run.values["mesh.element"] for run in runs} == {"3413", "3-10-1-3", "3443"}
 
 
+def test_keys_for_all_runs(tmp_path):
+    """They come before what a run changes itself, and are no columns."""
+    from ancf_petsc.studies.read import load_study
+    from ancf_petsc.studies.runs import runs_of
+    from ancf_petsc.studies.table import StudyOutcome
+
+    common = '[set]\n"statics.steps" = ""\nstatics.times = [0.5, 1.0]\n"mesh.element" = "3443"\n[vary]'
+    text = STUDY.replace("[vary]", common)
+    text = text.replace('"mesh.element" = ["3413", "3-10-1-3"]\n', "") + '[[rows]]\n"mesh.element" = "3413"\n'
+    study = load_study(write(tmp_path, text))
+    runs = runs_of(study, tmp_path)
+    assert {run.case.spec.statics.times for run in runs} == {(0.5, 1.0)}
+    assert sorted(run.values["mesh.element"] for run in runs) == ["3413", *3 * ["3443"]]
+    assert StudyOutcome(study, runs, tmp_path).columns[:3] == ["mesh.divisions", "mesh.element", "status"]
+
+
+def test_a_wrong_key_for_all_runs(tmp_path, capsys):
+    file = write(tmp_path, STUDY.replace("[vary]", '[set]\n"material.yung" = 1.0\n[vary]'))
+    assert main(["study", str(file), "--out", str(tmp_path / "out")]) == 2
+    assert "material.yung: unknown key; did you mean 'young'" in capsys.readouterr().err
+
+
 def test_combinations_that_no_mesh_fits_are_rows_not_ends(tmp_path):
     from ancf_petsc.errors import CaseError
     from ancf_petsc.studies.read import load_study

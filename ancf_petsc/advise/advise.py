@@ -15,9 +15,9 @@ from ancf_petsc.advise.line import Discretisation
 from ancf_petsc.advise.meshes import elements_for, families
 from ancf_petsc.advise.motion import SPACE, Timing, timings
 from ancf_petsc.advise.question import read_quantity, read_target
-from ancf_petsc.advise.report import Advice, Recommendation
+from ancf_petsc.advise.report import Advice, Recommendation, percent
 from ancf_petsc.advise.scene import working_case
-from ancf_petsc.advise.search import FIRST, Found, begin, search
+from ancf_petsc.advise.search import FIRST, Ranking, begin, search
 from ancf_petsc.advise.steps import STEPS, fewest_steps
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input.load import Case
@@ -133,7 +133,7 @@ def _announcement(work: _Search) -> str:
     )
 
 
-def _statics(work: _Search) -> tuple[Found, None]:
+def _statics(work: _Search) -> tuple[Ranking, None]:
     if work.free:
         count = _first_steps(work)
         for line in work.lines:
@@ -155,7 +155,7 @@ def _first_steps(work: _Search) -> int:
     return own.steps or 1 if own else 1
 
 
-def _steps_of_best(work: _Search, found: Found, guess: BestGuess) -> Found:
+def _steps_of_best(work: _Search, found: Ranking, guess: BestGuess) -> Ranking:
     """Whether fewer or more steps are cheaper for the best: tried where it stands, if that is affordable."""
     best = found.choices[0]
     count = int(best.line.more[STEPS])
@@ -168,10 +168,10 @@ def _steps_of_best(work: _Search, found: Found, guess: BestGuess) -> Found:
         changed = best.line.make(work.lab, best.level)
         if changed is None or changed.value is None:
             best.line.more = {**best.line.more, STEPS: count}
-    return Found(guess, ranked(work.lines, guess, work.target), found.complete)
+    return Ranking(guess, ranked(work.lines, guess, work.target), found.complete)
 
 
-def _motion(work: _Search) -> tuple[Found, Timing | None]:
+def _motion(work: _Search) -> tuple[Ranking, Timing | None]:
     """Time on one coarse mesh first, then space with the cheapest integrator that was good enough."""
     ways: list[Timing] = []
     for line in work.lines:
@@ -180,7 +180,7 @@ def _motion(work: _Search) -> tuple[Found, Timing | None]:
             break
     if not ways:
         work.notes.append("no integrator was within its share of the target on a coarse mesh")
-        return Found(None, [], complete=False), None
+        return Ranking(None, [], complete=False), None
     for way in ways:
         drift = f"energy drifts by {100 * way.drift:.2g} % of the largest"
         work.notes.append(
@@ -194,11 +194,11 @@ def _motion(work: _Search) -> tuple[Found, Timing | None]:
     found = search(work.lines, work.lab, SPACE * work.target)
     if found.choices and found.guess:
         best = _cheaper_in_time(work, found, found.guess, ways)
-        found = Found(found.guess, ranked(work.lines, found.guess, SPACE * work.target), found.complete)
+        found = Ranking(found.guess, ranked(work.lines, found.guess, SPACE * work.target), found.complete)
     return found, best
 
 
-def _cheaper_in_time(work: _Search, found: Found, guess: BestGuess, ways: list[Timing]) -> Timing:
+def _cheaper_in_time(work: _Search, found: Ranking, guess: BestGuess, ways: list[Timing]) -> Timing:
     """The integrator that is cheapest on the mesh that was chosen: costs change with the mesh."""
     choice, best = found.choices[0], ways[0]
     cheapest = choice.seconds
@@ -217,9 +217,10 @@ def _cheaper_in_time(work: _Search, found: Found, guess: BestGuess, ways: list[T
     return best
 
 
-def _advice(work: _Search, found: Found, timing: Timing | None, case: Case, quantity: str) -> Advice:
+def _advice(work: _Search, found: Ranking, timing: Timing | None, case: Case, quantity: str) -> Advice:
     guess = found.guess
-    made = [_recommended(choice, guess, timing, work) for choice in found.choices[:2]] if guess else []
+    known = guess is not None and guess.uncertainty <= work.target
+    made = [_recommended(choice, guess, timing, work) for choice in found.choices[:2]] if known else []
     failures = {
         line.name: line.stopped
         for line in work.lines
@@ -228,7 +229,12 @@ def _advice(work: _Search, found: Found, timing: Timing | None, case: Case, quan
     notes = list(work.notes)
     if not found.complete:
         notes.append("the budget or the meshes ended the search before it was complete")
-    if guess is not None and not guess.claimed:
+    if guess is not None and not known:
+        notes.append(
+            f"the reference is uncertain by {percent(guess.uncertainty)}, more than the target: "
+            "a larger --budget makes it surer where finer meshes converge"
+        )
+    elif guess is not None and not guess.claimed:
         notes.append(
             "without a limit the error is against where the best ladder leads: more than that cannot be promised"
         )

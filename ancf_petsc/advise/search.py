@@ -19,7 +19,7 @@ ROUNDS = 40
 
 
 @dataclass
-class Found:
+class Ranking:
     """What a search came to. choices: the cheapest first, one a discretisation. complete: False where the budget ended it."""
 
     guess: BestGuess | None
@@ -48,7 +48,7 @@ def _worth(line: Discretisation, level: float, lab: Lab) -> bool:
     return run.facts.dof <= LARGEST_FIRST or level == 0.0
 
 
-def search(lines: Sequence[Discretisation], lab: Lab, target: float) -> Found:
+def search(lines: Sequence[Discretisation], lab: Lab, target: float) -> Ranking:
     """Go on from the first levels until the cheapest that is good enough has been run, and the guess is sure enough."""
     guess: BestGuess | None = None
     choices: list[Choice] = []
@@ -59,13 +59,13 @@ def search(lines: Sequence[Discretisation], lab: Lab, target: float) -> Found:
         choices = ranked(lines, guess, target)
         wanted = _next(lines, guess, choices, target, lab)
         if wanted is None:
-            return Found(guess, choices, complete=bool(choices))
+            return Ranking(guess, choices, complete=bool(choices) and guess.uncertainty <= SURE * target)
         line, level = wanted
         line.make(lab, level)
         if lab.left <= 0:
             break
     guess = best_guess(lines, lab)
-    return Found(guess, ranked(lines, guess, target) if guess else [], complete=False)
+    return Ranking(guess, ranked(lines, guess, target) if guess else [], complete=False)
 
 
 def _next(

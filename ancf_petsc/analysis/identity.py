@@ -8,6 +8,7 @@ that only report count for nothing.
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -101,8 +102,8 @@ def _included(file: Path) -> Iterator[Path]:
         return
     for match in pattern.finditer(file.read_bytes()):
         name = match["name"].strip().strip(b"\"'").decode("utf-8", "replace")
-        other = (file.parent / name).resolve()
-        if other.is_file():
+        other = Path(os.path.realpath(file.parent / name))
+        if os.path.isfile(other):
             yield other
 
 

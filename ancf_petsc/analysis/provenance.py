@@ -22,8 +22,12 @@ from ancf_petsc.input.load import Case, case_from_text
 from ancf_petsc.log import RECORD
 from ancf_petsc.plan.case_mesh import mesh_file
 from ancf_petsc.results.checkpoint_file import all_in
+from ancf_petsc.results.tables import file_text
 
 log = logging.getLogger(RECORD)
+
+RECORDED = ("text", "file", "folder", "name", "mesh_file", "mesh_sha256")
+"""What it takes to repeat a run."""
 
 
 @dataclass(frozen=True)
@@ -120,32 +124,27 @@ def recorded_case(folder: Path, summary: Mapping[str, Any] | None = None) -> Cas
 def _of_summary(said: Mapping[str, Any]) -> dict[str, str]:
     case, mesh = said["case"], said["mesh"]
     found = {**case, "mesh_file": mesh["file"], "mesh_sha256": mesh["sha256"]}
-    return {name: str(value) for name, value in found.items()}
+    return {name: str(found[name]) for name in RECORDED}
 
 
 def _recorded(folder: Path) -> dict[str, str]:
     """text, file, folder, name, mesh_file, mesh_sha256 of a run: from its summary, or from a checkpoint or its results if it
     was cut short.
     """
-    with suppress(OSError, ValueError, KeyError, TypeError):
-        return _of_summary(json.loads((folder / "summary.json").read_text(encoding="utf-8")))
+    with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
+        return _of_summary(json.loads(file_text(folder / "summary.json")))
     with suppress(OSError, KeyError, IndexError):
         return _of_summary(all_in(folder)[0][0].about["run"])
     from ancf_petsc.results.reader import open_results
 
     facts = open_results(folder).facts
-    if "case" not in facts:
+    found = {name: facts.get(name if name.startswith("mesh") else f"case_{name}") for name in RECORDED}
+    found["text"] = facts.get("case")
+    if None in found.values():
         raise CaseError(
             "this run did not record its case",
             file=folder,
             key="--again",
             cure="it is of an earlier version: run the case file",
         )
-    return {
-        "text": facts["case"],
-        "file": facts["case_file"],
-        "folder": facts["case_folder"],
-        "name": facts["case_name"],
-        "mesh_file": facts["mesh_file"],
-        "mesh_sha256": facts["mesh_sha256"],
-    }
+    return {name: str(found[name]) for name in RECORDED}

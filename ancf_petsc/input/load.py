@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -61,8 +62,8 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), petsc_options: Se
     file = _case_file(Path(path))
     data = toml.read(file)
     _change(data, overrides, petsc_options)
-    name = file.resolve().parent.name if file.name == CASE_FILE else file.stem
-    return _checked(data, file, file.resolve().parent, name, _with_changes(file, overrides))
+    name = Path(os.path.realpath(file)).parent.name if file.name == CASE_FILE else file.stem
+    return _checked(data, file, Path(os.path.realpath(file)).parent, name, _with_changes(file, overrides))
 
 
 def case_from_text(
@@ -139,14 +140,14 @@ def refuse_nul(value: Any, file: str | Path, path: tuple[str, ...] = ()) -> None
 def _case_file(path: Path) -> Path:
     if "\0" in str(path):
         raise CaseError("a NUL character in a path", got=str(path), expected="a case", cure="remove it")
-    if path.is_dir():
+    if os.path.isdir(path):
         if (path / CASE_FILE).is_file():
             return path / CASE_FILE
         others = ", ".join(sorted(file.name for file in path.glob("*.toml"))) or "none"
         again = f"a run is here: ancf run {shlex.quote(str(path))} --again repeats it"
         cure = again if (path / "results.h5").is_file() else f"*.toml here: {others}"
         raise CaseError(f"no {CASE_FILE} in this folder", file=path, expected=CASE_FILE, cure=cure)
-    if path.is_file():
+    if os.path.isfile(path):
         return path
     raise CaseError(
         "no such file or folder",

@@ -6,7 +6,7 @@ The geometry of `pvc_block` is assumed: the drawing in the paper is lost.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -87,10 +87,10 @@ def beam(about: str, width: float, *, layer: float = 1.0) -> Primitive:
 
     layer: thickness of the middle layer of bricks along x, in parts of the others'.
     """
-    high = (1.0, width, width)
+    low, high = (0.0, 0.0, 0.0), (1.0, width, width)
 
     def grid(divisions: Sequence[int]) -> Floats:
-        points = _box_grid(divisions, (0, 0, 0), high)
+        points = _box_grid(divisions, low, high)
         parts = np.ones(divisions[0])
         parts[divisions[0] // 2] = layer
         x = np.concatenate([[0.0], np.cumsum(parts)]) / parts.sum()
@@ -99,10 +99,9 @@ def beam(about: str, width: float, *, layer: float = 1.0) -> Primitive:
         return points
 
     faces: Faces = {"clamp": (("x", 0.0),), "end": (("x", 1.0),)}
-    divisions, rims = (20, 2, 2), (("x", 0.0),)
-    return Primitive(
-        about, partial(_add_box, low=(0, 0, 0), high=high), grid, faces, {}, width / 2, divisions, rims
-    )
+    rims = (("x", 0.0),)
+    whole = box(about, low, high, faces=faces, size=width / 2, divisions=(20, 2, 2), rims=rims)
+    return replace(whole, grid=grid)
 
 
 INNER, OUTER, HEIGHT = 0.025, 0.095, 0.1

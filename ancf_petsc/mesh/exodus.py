@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ancf_petsc.errors import EnvironmentProblem
+from ancf_petsc.mesh.foreign.process import CURES, contents
 from ancf_petsc.mesh.kinds import KINDS
 from ancf_petsc.mesh.mesh import Integers
 from ancf_petsc.mesh.raw import Block, RawMesh, mesh_error
@@ -48,34 +48,28 @@ SIDES = {
 
 def read_exodus(path: Path) -> RawMesh:
     """The mesh in a file. Raises MeshError where it cannot be read, EnvironmentProblem without netCDF4."""
+    found = contents(path, "netcdf")
     try:
-        import netCDF4
-    except ImportError as error:
-        raise EnvironmentProblem(
-            f"Exodus files need netCDF4 ({error}); install it: pip install netCDF4"
-        ) from None
-    wrong = mesh_error(path)
-    try:
-        data = netCDF4.Dataset(str(path))
-    except (OSError, RuntimeError, ValueError) as error:
-        raise wrong(f"netCDF4 cannot read it ({error})", cure="write the mesh again as Exodus") from None
-    with data:
-        data.set_auto_mask(False)
-        try:
-            return _Exodus(data, path).mesh()
-        except (KeyError, IndexError, ValueError, AttributeError, OSError, RuntimeError) as error:
-            reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
-            raise wrong(f"not a mesh of Exodus ({reason})", cure="write the mesh again as Exodus") from None
+        return _Exodus(found, path).mesh()
+    except (KeyError, IndexError, ValueError, AttributeError, TypeError, OverflowError) as error:
+        reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        raise mesh_error(path)(f"not a mesh of Exodus ({reason})", cure=CURES["netcdf"]) from None
 
 
 class _Exodus:
-    def __init__(self, data: Any, path: Path) -> None:
-        self.data, self.path = data, path
+    """The mesh of what `foreign.by_netcdf` found."""
+
+    def __init__(self, found: dict[str, Any], path: Path) -> None:
+        self.path = path
+        self.dimensions: dict[str, int] = found["dimensions"]
+        self.variables: dict[str, np.ndarray] = found["variables"]
+        self.titles: dict[str, str] = found["titles"]
         self.names: list[str] = []
         self.node_sets: dict[str, Integers] = {}
 
     def mesh(self) -> RawMesh:
-        count = len(self.data.dimensions["num_nodes"])
+        count = self.dimensions["num_nodes"]
+        self._check_counts(count)
         numbers = self._numbers("node_num_map", count)
         blocks, rows = self._blocks(numbers)
         for number, name in self._sets("ns", "node_ns", "num_node_sets"):
@@ -85,8 +79,31 @@ class _Exodus:
         names = list(dict.fromkeys(self.names))
         return RawMesh(numbers, self._points(count), blocks, names, self.node_sets)
 
+    def _check_counts(self, count: int) -> None:
+        """Sizes of dimensions are those of what stands in the file."""
+        wrong = mesh_error(self.path)
+        axes = [name for name in ("coordx", "coordy", "coordz") if name in self.variables]
+        given = self.variables["coord"].shape[-1:] if "coord" in self.variables else ()
+        found = given or tuple(len(self.variables[name]) for name in axes) or (0,)
+        if set(found) != {count}:
+            raise wrong(
+                f"coordinates of {found[0]} nodes",
+                expected=f"{count} as num_nodes says",
+                cure=CURES["netcdf"],
+            )
+        rows = [one.shape for name, one in self.variables.items() if name.startswith("connect")]
+        if any(len(shape) != 2 for shape in rows):
+            raise wrong("a block of elements is no table", cure=CURES["netcdf"])
+        total = self.dimensions.get("num_elem", 0)
+        if sum(shape[0] for shape in rows) < total:
+            raise wrong(
+                f"the blocks hold {sum(shape[0] for shape in rows)} elements",
+                expected=f"{total} as num_elem says",
+                cure=CURES["netcdf"],
+            )
+
     def _array(self, name: str) -> np.ndarray:
-        return np.asarray(self.data.variables[name][:])
+        return np.asarray(self.variables[name])
 
     def _indices(self, name: str, bound: int) -> Integers:
         """Indices from 0 of what a variable numbers from 1."""
@@ -98,38 +115,36 @@ class _Exodus:
         return found
 
     def _numbers(self, name: str, count: int) -> Integers:
-        numbers = (
-            self._array(name).astype(np.int64) if name in self.data.variables else np.arange(1, count + 1)
-        )
+        numbers = self._array(name).astype(np.int64) if name in self.variables else np.arange(1, count + 1)
         if len(np.unique(numbers)) < count or numbers.min(initial=1) < 1:
             return np.arange(1, count + 1)
         return numbers
 
     def _points(self, count: int) -> np.ndarray:
         points = np.zeros((count, 3))
-        if "coord" in self.data.variables:
+        if "coord" in self.variables:
             given = self._array("coord").T
             points[:, : given.shape[1]] = given
             return points
         for axis, name in enumerate(("coordx", "coordy", "coordz")):
-            if name in self.data.variables:
+            if name in self.variables:
                 points[:, axis] = self._array(name)
         return points
 
     def _sets(self, short: str, variable: str, dimension: str) -> list[tuple[int, str]]:
         """Number of each block or set, and its name: as given, else its kind and id."""
-        if dimension not in self.data.dimensions:
+        if dimension not in self.dimensions:
             return []
-        count = len(self.data.dimensions[dimension])
-        ids = (
-            self._array(f"{short}_prop1")
-            if f"{short}_prop1" in self.data.variables
-            else np.arange(1, count + 1)
-        )
-        given = self._words(f"{short}_names") if f"{short}_names" in self.data.variables else [""] * count
+        count = self.dimensions[dimension]
+        if count > len(self.variables):
+            raise mesh_error(self.path)(
+                f"{dimension} is {count}", expected="as many as stand in the file", cure=CURES["netcdf"]
+            )
+        ids = self._array(f"{short}_prop1") if f"{short}_prop1" in self.variables else np.arange(1, count + 1)
+        given = self._words(f"{short}_names") if f"{short}_names" in self.variables else [""] * count
         kind = {"eb": "block", "ns": "nodeset", "ss": "sideset"}[short]
         found = [(k + 1, given[k] or f"{kind}_{ids[k]}") for k in range(count)]
-        return [(number, name) for number, name in found if f"{variable}{number}" in self.data.variables]
+        return [(number, name) for number, name in found if f"{variable}{number}" in self.variables]
 
     def _words(self, name: str) -> list[str]:
         words = []
@@ -144,13 +159,13 @@ class _Exodus:
     def _blocks(self, numbers: Integers) -> tuple[list[Block], list[tuple[str, Integers]]]:
         """Blocks of cells; and for each the kind of its corners and its nodes as they stand, for side sets."""
         blocks, rows, start = [], [], 0
-        total = len(self.data.dimensions["num_elem"]) if "num_elem" in self.data.dimensions else 0
+        total = self.dimensions.get("num_elem", 0)
         own = self._numbers("elem_num_map", total)
         for number, name in self._sets("eb", "connect", "num_el_blk"):
-            variable = self.data.variables[f"connect{number}"]
+            variable = self.variables[f"connect{number}"]
             shape = variable.shape
             nodes = self._indices(f"connect{number}", len(numbers)).reshape(shape)
-            title = str(getattr(variable, "elem_type", "")).strip("\0 ").upper()
+            title = self.titles[f"connect{number}"].strip("\0 ").upper()
             kind = FAMILIES.get(title[:3], {}).get(shape[1], title)
             ordered = nodes[:, ORDER[kind]] if kind in ORDER else nodes
             blocks.append(Block(kind, own[start : start + len(nodes)], numbers[ordered], (name,)))

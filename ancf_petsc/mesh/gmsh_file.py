@@ -8,29 +8,20 @@ uses.
 from __future__ import annotations
 
 import mmap
-import os
-import pickle
 import re
-import signal
-import subprocess
-import sys
 from collections import defaultdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ancf_petsc.errors import EnvironmentProblem
-from ancf_petsc.mesh import gmsh_child
+from ancf_petsc.mesh.foreign.process import CURES, contents
 from ancf_petsc.mesh.kinds import BY_GMSH
 from ancf_petsc.mesh.mesh import Floats, Integers
 from ancf_petsc.mesh.raw import Block, RawMesh, mesh_error
 from ancf_petsc.mesh.text import decoded
 
-CURE = "the file may be truncated or damaged: write it again"
-
-LEAST_PATIENCE, SLOWEST = 60.0, 1e5
-"""Seconds, and bytes a second: damaged counts keep Gmsh busy for ever; it reads whole files a hundred times faster."""
+CURE = CURES["gmsh"]
 
 Names = dict[tuple[int, int], str]
 
@@ -50,7 +41,7 @@ def read_gmsh(path: Path) -> RawMesh:
         notes: list[str] = []
         names = _physical_names(data, notes)
         old = header.version < 4
-        found = _contents(path, swapped=old)
+        found = contents(path, "gmsh", str(int(old)))
         numbers, coordinates = found["nodes"]
         numbers, points = numbers.astype(np.int64), coordinates.reshape(-1, 3)
         if old:
@@ -101,30 +92,6 @@ def _physical_names(data: mmap.mmap, notes: list[str]) -> Names:
     lines = decoded(section[1], notes) if section else ""
     entries = re.findall(r'(\d+)\s+(-?\d+)\s+"([^"\n]*)"', lines)
     return {(int(dimension), abs(int(tag))): name for dimension, tag, name in entries}
-
-
-def _contents(path: Path, *, swapped: bool) -> dict[str, Any]:
-    """What `gmsh_child.contents` found in the file."""
-    command = [sys.executable, "-P", gmsh_child.__file__, str(path), str(int(swapped))]
-    # A Gmsh built with MPI must not take itself for a rank of this run.
-    environment = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMI", "PMIX_", "MPI_"))}
-    patience = LEAST_PATIENCE + path.stat().st_size / SLOWEST
-    try:
-        child = subprocess.run(
-            command, capture_output=True, env=environment, stdin=subprocess.DEVNULL, timeout=patience
-        )
-    except subprocess.TimeoutExpired:
-        raise mesh_error(path)(f"Gmsh does not come to an end of it in {patience:.0f} s", cure=CURE) from None
-    if child.returncode == 0:
-        return pickle.loads(child.stdout)
-    reason = " ".join(child.stdout.decode("utf-8", "replace").split())
-    if child.returncode == gmsh_child.NO_GMSH:
-        raise EnvironmentProblem(f"Gmsh cannot be loaded ({reason}); install it: pip install gmsh")
-    wrong = mesh_error(path)
-    if child.returncode < 0:
-        cure = "the file may be truncated or damaged, or elements refer to nodes it lacks: write it again"
-        raise wrong(f"Gmsh crashes on it ({signal.Signals(-child.returncode).name})", cure=cure)
-    raise wrong(f"Gmsh cannot read it ({reason or 'no reason given'})", cure=CURE)
 
 
 def _announced(data: mmap.mmap, header: Header) -> int | None:

@@ -6,6 +6,7 @@ import os
 from hashlib import sha256
 from importlib import metadata
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from ancf_petsc.errors import CaseError, did_you_mean, writing
@@ -32,18 +33,19 @@ def made_mesh(request: Request) -> Path:
         return place
     with writing(place):
         place.parent.mkdir(parents=True, exist_ok=True)
-    draft = place.with_name(f"{place.stem}.{os.getpid()}.msh")
-    asked = request._asdict()
-    try:
-        make_mesh(asked.pop("body"), draft, **asked)
-    except CaseError as error:
-        named = (error.key or "").removeprefix("--")
-        error.key = "mesh.body" if named in ("NAME", "out", "") else f"mesh.{named}"
-        error.expected, error.cure = (
-            text and text.replace("--", "mesh.") for text in (error.expected, error.cure)
-        )
-        raise
-    draft.replace(place)
+    with writing(place), TemporaryDirectory(prefix=".", dir=place.parent) as folder:
+        draft = Path(folder) / place.name
+        asked = request._asdict()
+        try:
+            make_mesh(asked.pop("body"), draft, **asked)
+        except CaseError as error:
+            named = (error.key or "").removeprefix("--")
+            error.key = "mesh.body" if named in ("NAME", "out", "") else f"mesh.{named}"
+            error.expected, error.cure = (
+                text and text.replace("--", "mesh.") for text in (error.expected, error.cure)
+            )
+            raise
+        draft.replace(place)
     return place
 
 

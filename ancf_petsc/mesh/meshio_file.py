@@ -7,8 +7,6 @@ These formats lose or hide their own numbers: nodes and cells are numbered from 
 
 from __future__ import annotations
 
-import contextlib
-import io
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from ancf_petsc.mesh.foreign.process import LONGEST_REASON, contents
 from ancf_petsc.mesh.kinds import KINDS
-from ancf_petsc.mesh.mesh import Integers
+from ancf_petsc.mesh.mesh import Floats, Integers
 from ancf_petsc.mesh.raw import Block, RawMesh, mesh_error
 
 TAGS = ("gmsh:physical", "medit:ref", "nastran:ref", "netgen:index", "su2:tag", "abaqus:material")
@@ -33,12 +32,10 @@ ALL = ".msh .vtu .vtk .xdmf .inp .med .bdf .mesh"
 def read_meshio(path: Path) -> RawMesh:
     """The mesh in a file of any format meshio reads."""
     mesh, notes = _read(path)
-    points = np.zeros((len(mesh.points), 3))
-    if len(points):
-        points[:, : mesh.points.shape[1]] = mesh.points
+    points = _points(mesh["points"], path)
     numbers = np.arange(1, len(points) + 1)
-    kinds = [SAME.get(block.type, block.type) for block in mesh.cells]
-    cells = [_nodes(block, kind) for block, kind in zip(mesh.cells, kinds, strict=True)]
+    kinds = [SAME.get(kind, kind) for kind, _ in mesh["cells"]]
+    cells = [_nodes(nodes, kind) for (_, nodes), kind in zip(mesh["cells"], kinds, strict=True)]
     first = np.cumsum([1, *map(len, cells)])
     blocks = [
         Block(kind, np.arange(start, start + len(nodes)), nodes.astype(np.int64) + 1)
@@ -51,9 +48,27 @@ def read_meshio(path: Path) -> RawMesh:
         if len(rows)
     ]
     node_sets = {name: _rows(rows, len(points), name, path) + 1 for name, rows in _point_sets(mesh)}
-    names = [*mesh.cell_sets, *(name for block in listed for name in block.names), *node_sets]
+    names = [
+        *(name for name, _ in mesh["cell_sets"]),
+        *(name for block in listed for name in block.names),
+        *node_sets,
+    ]
     _check_widths(blocks, path)
     return RawMesh(numbers, points, blocks + listed, list(dict.fromkeys(names)), node_sets, notes=notes)
+
+
+def _points(given: Any, path: Path) -> Floats:
+    """Points (n, 3); missing coordinates are 0."""
+    points = np.zeros((len(given) if given.ndim else 0, 3))
+    if len(points):
+        if given.ndim != 2 or given.shape[1] > 3:
+            raise mesh_error(path)(
+                f"its points are a table of shape {given.shape}",
+                expected="up to three coordinates a point",
+                cure=CURE,
+            )
+        points[:, : given.shape[1]] = given
+    return points
 
 
 def _check_widths(blocks: list[Block], path: Path) -> None:
@@ -83,47 +98,33 @@ def _rows(rows: Any, count: int, name: str, path: Path) -> Integers:
     return found.astype(np.int64)
 
 
-def _read(path: Path) -> tuple[Any, list[str]]:
-    """meshio's mesh, and what it leaves out without harm; it prints, and may leave the interpreter, when it cannot read.
+def _read(path: Path) -> tuple[dict[str, Any], list[str]]:
+    """What `foreign.by_meshio` finds, and what meshio leaves out without harm.
 
     Raises MeshError also where it leaves out what may belong to the mesh.
     """
-    import meshio
-
     wrong = mesh_error(path)
-    if not set(path.suffixes) & set(meshio.extension_to_filetypes):
+    found = contents(path, "meshio")
+    if not found["known"]:
         raise wrong(
             "not a format meshes are read from",
             got=path.suffix,
             expected=f"one of {ALL} or what meshio reads",
         )
-    said = io.StringIO()
-    try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            mesh = meshio.read(path)
-    except SystemExit:
-        reason = said.getvalue()
-    except Exception as error:
-        reason = f"{type(error).__name__}: {error}"
-    else:
-        lines = " ".join(said.getvalue().split())
-        if lines and not HARMLESS.search(lines):
-            raise wrong(f"meshio leaves out part of it ({lines})", cure=CURE)
-        return mesh, [f"left out of the mesh file: {lines}"] if lines else []
-    reason = " ".join(reason.split())
-    raise wrong(f"meshio cannot read it ({reason or 'no reason given'})", cure=CURE)
+    lines = found["said"]
+    if lines and not HARMLESS.search(lines):
+        raise wrong(f"meshio leaves out part of it ({lines[:LONGEST_REASON]})", cure=CURE)
+    return found, [f"left out of the mesh file: {lines[:LONGEST_REASON]}"] if lines else []
 
 
-def _nodes(block: Any, kind: str) -> np.ndarray:
-    """Rows (m, k) of points; k is 0 for polyhedra, whose cells have different numbers of nodes."""
-    if not len(block.data) or kind.startswith("polyhedron"):
-        return np.empty((len(block.data), KINDS[kind].nodes if kind in KINDS else 0))
-    return np.asarray(block.data)
+def _nodes(nodes: np.ndarray, kind: str) -> np.ndarray:
+    """Rows (m, k) of points, also where there are none."""
+    return nodes if nodes.shape[1] else np.empty((len(nodes), KINDS[kind].nodes if kind in KINDS else 0))
 
 
 def _cell_sets(mesh: Any, kinds: list[str], path: Path) -> Iterator[tuple[str, int, Integers]]:
     """Name, number of the cell block, rows of it."""
-    for name, by_block in mesh.cell_sets.items():
+    for name, by_block in mesh["cell_sets"]:
         if len(by_block) > len(kinds):
             raise mesh_error(path)(
                 f"the set {name} speaks of {len(by_block)} blocks of cells",
@@ -132,10 +133,18 @@ def _cell_sets(mesh: Any, kinds: list[str], path: Path) -> Iterator[tuple[str, i
             )
         for block, rows in enumerate(by_block):
             if rows is not None:
-                yield name, block, _rows(rows, len(mesh.cells[block].data), name, path)
-    for key, by_block in mesh.cell_data.items():
-        if key == "cell_tags" and hasattr(mesh, "cell_tags"):
-            names = dict(mesh.cell_tags)
+                yield name, block, _rows(rows, len(mesh["cells"][block][1]), name, path)
+    yield from _tagged_cells(mesh, kinds, path)
+
+
+def _tagged_cells(mesh: Any, kinds: list[str], path: Path) -> Iterator[tuple[str, int, Integers]]:
+    """The same of data that number sets."""
+    sizes = [len(nodes) for _, nodes in mesh["cells"]]
+    for key, by_block in mesh["cell_data"]:
+        if [len(tags) for tags in by_block] != sizes:
+            raise mesh_error(path)(f"the data {key} do not fit the cells", cure=CURE)
+        if key == "cell_tags" and mesh["cell_tags"] is not None:
+            names = dict(mesh["cell_tags"])
         elif key in TAGS:
             names = None
         else:
@@ -152,9 +161,11 @@ def _cell_sets(mesh: Any, kinds: list[str], path: Path) -> Iterator[tuple[str, i
 
 def _point_sets(mesh: Any) -> Iterator[tuple[str, Integers]]:
     """Name, rows of the points."""
-    yield from mesh.point_sets.items()
-    for key, tags in mesh.point_data.items():
-        families = getattr(mesh, "point_tags", {}) if key == "point_tags" else _set_names(key, [tags])
+    yield from mesh["point_sets"]
+    for key, (tags,) in mesh["point_data"]:
+        if len(tags) != len(mesh["points"]):
+            continue
+        families = dict(mesh["point_tags"] or {}) if key == "point_tags" else _set_names(key, [tags])
         rows: dict[str, list[Integers]] = {}
         for tag, names in families.items():
             for name in names:
@@ -168,15 +179,15 @@ def _tag_names(mesh: Any, dimension: int, tag: int) -> list[str]:
     if tag == 0:
         return []
     named = [
-        name
-        for name, value in mesh.field_data.items()
-        if np.size(value) == 2 and tuple(np.ravel(value)) == (tag, dimension)
+        name for name, value in mesh["field_data"] if len(value) == 2 and tuple(value) == (tag, dimension)
     ]
     return named or [f"physical_{dimension}_{tag}"]
 
 
 def _set_names(key: str, data: list[np.ndarray]) -> dict[int, list[str]]:
     """Tag -> name where `key` is the names of sets joined by "-" and the data number them, -1 for none."""
+    if not data:
+        return {}
     names = key.split("-")
     tags = np.unique(np.concatenate([np.ravel(part) for part in data]))
     counted = tags.dtype.kind in "iu" and len(tags) and tags.min() >= -1 and tags.max() == len(names) - 1

@@ -39,7 +39,7 @@ def read_binary(path: Path) -> RawMesh | None:
         numbers, points, rows = read(data, order, names)
     except NotOrdinary:
         return None
-    except (ValueError, IndexError) as error:
+    except (ValueError, IndexError, OverflowError) as error:
         raise mesh_error(path)(f"a section is cut off ({error})", cure=CURE) from None
     return raw_mesh(numbers, points, rows, names, path, notes)
 

@@ -29,6 +29,9 @@ PARAMETRIC = "ParametricNodes"
 MOST_RUNS = 10_000
 """Of elements of one kind with equally many tags: more are not worth looking at one by one."""
 
+MOST_NUMBER = 2**53
+"""Numbers of nodes are read as floating point: up to here exactly."""
+
 CURE = "the file is truncated or damaged: write it again"
 
 Names = dict[tuple[int, int], str]
@@ -48,7 +51,7 @@ def read_ordinary(path: Path) -> RawMesh | None:
         read = _read_22 if version == "2.2" else _read_41
         numbers, points, rows = read(sections, names)
         return raw_mesh(numbers, points, rows, names, path, notes)
-    except (NotOrdinary, ValueError, IndexError):
+    except (NotOrdinary, ValueError, IndexError, OverflowError):
         check_lines(path)
         return None
 
@@ -76,7 +79,7 @@ def check_lines(path: Path) -> None:
                 if version < 4
                 else counts[0] + counts[1] * (2 if name == "Nodes" and version > 4 else 1)
             )
-        except (ValueError, IndexError):
+        except (ValueError, IndexError, OverflowError):
             raise mesh_error(path)(f"${name} does not begin with how many they are", cure=CURE) from None
         if len(lines) - 1 != expected:
             raise mesh_error(path)(
@@ -131,9 +134,19 @@ def _numbers(text: str, kind: type) -> np.ndarray:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            return np.fromstring(text, kind, sep=" ")
+            found: np.ndarray = np.fromstring(text, kind, sep=" ")
         except DeprecationWarning:
             raise NotOrdinary from None
+    if kind is np.int64 and len(found) and max(-int(found.min()), int(found.max())) >= MOST_NUMBER:
+        raise NotOrdinary  # larger ones have become the largest there is
+    return found
+
+
+def _whole(found: Floats) -> Integers:
+    """Numbers of nodes, read beside coordinates."""
+    if not (found == np.floor(found)).all() or not (np.abs(found) < MOST_NUMBER).all():
+        raise NotOrdinary
+    return found.astype(np.int64)
 
 
 def group_of(names: Names, dimension: int, tag: int) -> tuple[str, ...]:
@@ -156,7 +169,7 @@ def _read_22(sections: dict[str, str], names: Names) -> tuple[Integers, Floats, 
             group = group_of(names, kind.dimension, int(tag))
             own = run if len(tags) == 1 else run[tags == tag]
             rows[kind.name, group].append(np.delete(own, np.s_[1 : 3 + own[0, 2]], axis=1))
-    return table[:, 0].astype(np.int64), table[:, 1:], rows
+    return _whole(table[:, 0]), table[:, 1:], rows
 
 
 def _runs(flat: Integers) -> Iterator[tuple[int, Integers]]:
@@ -192,7 +205,7 @@ def _read_41(sections: dict[str, str], names: Names) -> tuple[Integers, Floats, 
     flat, rows, at, count, blocks = _numbers(sections["Elements"], np.int64), defaultdict(list), 4, 0, 0
     while at < len(flat):
         dimension, entity, number, size = (int(value) for value in flat[at : at + 4])
-        if number not in BY_GMSH or (dimension, entity) not in groups:
+        if number not in BY_GMSH or (dimension, entity) not in groups or not 0 <= size <= len(flat):
             raise NotOrdinary
         width, at = 1 + BY_GMSH[number].nodes, at + 4
         block = flat[at : at + size * width].reshape(size, width)
@@ -207,13 +220,13 @@ def _nodes_41(flat: Floats) -> tuple[Integers, Floats]:
     numbers, points, at = [np.empty(0)], [np.empty((0, 3))], 4
     while at < len(flat):
         _, _, parametric, size = (int(value) for value in flat[at : at + 4])
-        if parametric:
+        if parametric or not 0 <= size <= len(flat):
             raise NotOrdinary
         at += 4
         numbers.append(flat[at : at + size])
         points.append(flat[at + size : at + 4 * size].reshape(size, 3))
         at += 4 * size
-    found = np.concatenate(numbers).astype(np.int64)
+    found = _whole(np.concatenate(numbers))
     if len(found) != flat[1] or len(numbers) - 1 != flat[0]:
         raise NotOrdinary
     return found, np.concatenate(points)

@@ -55,9 +55,9 @@ def _require_file(path: Path) -> None:
     wrong = mesh_error(path)
     if "\0" in str(path):
         raise wrong("a path cannot hold a zero byte", cure="mend mesh.file")
-    if not path.exists():
+    if not os.path.exists(path):
         raise wrong("there is no such file", cure="give the path of the mesh from the case file's folder")
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise wrong("not a file", expected="a mesh file")
     if not os.access(path, os.R_OK):
         raise wrong("the file may not be read", cure="change its permissions")

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import codecs
+import os
 from pathlib import Path
 
 from ancf_petsc.errors import MeshError
+
+MOST_FILES = 10_000
+MOST_TIMES, SPARE = 4, 64 * 2**20
+"""How often the bytes of a deck may be read, on the average, and bytes beyond that."""
 
 LATIN = "names are not UTF-8: read as Latin-1, as in {!r}"
 
@@ -59,3 +64,36 @@ def decoded(data: bytes, notes: list[str]) -> str:
         text = data.decode("latin-1")
         note_latin(text, error.start, notes)
         return text
+
+
+class DeckFiles:
+    """Reads the files of a deck. Files that include each other over and over would never come to an end."""
+
+    def __init__(self) -> None:
+        self._sizes: dict[str, int] = {}
+        self._count = self._taken = self._different = 0
+
+    def read(self, path: Path) -> bytes:
+        """The bytes of a file. Raises MeshError where it cannot be read, and where too much was included."""
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            raise MeshError(
+                f"cannot be read ({error.strerror or error})",
+                file=str(path),
+                key="mesh.file",
+                cure="mend the deck",
+            ) from None
+        name = os.path.realpath(path)
+        self._different += len(data) - self._sizes.get(name, 0)
+        self._sizes[name] = len(data)
+        self._count, self._taken = self._count + 1, self._taken + len(data)
+        if self._count > MOST_FILES or self._taken > SPARE + MOST_TIMES * self._different:
+            raise MeshError(
+                f"the deck includes {self._count} files, {len(self._sizes)} different ones",
+                file=str(path),
+                key="mesh.file",
+                expected=f"at most {MOST_FILES}, and none over and over",
+                cure="mend the deck",
+            )
+        return data

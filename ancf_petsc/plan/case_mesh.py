@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from ancf_petsc.element.catalog import element
@@ -16,7 +17,9 @@ def mesh_file(case: Case) -> Path:
     """The file of a case's mesh; one of the program's bodies is made if it is not there. Raises CaseError."""
     asked = case.spec.mesh
     if asked.body is None:
-        return (case.folder / str(asked.file)).resolve()
+        return Path(
+            os.path.realpath(case.folder / str(asked.file))
+        )  # Path.resolve raises on links in a circle
     from ancf_petsc.mesh.made import Request, made_mesh  # making meshes is rare, and takes time to import
 
     try:

@@ -18,6 +18,7 @@ import numpy as np
 from ancf_petsc.errors import CaseError, cannot_write, error_number
 from ancf_petsc.results.checkpoint_file import NAMES, sweep, sync
 from ancf_petsc.results.mark import MARK, Mark, read_mark, refuse_live_run
+from ancf_petsc.results.tables import file_text
 
 RUN_FILES = (
     *NAMES, "results.h5", "results.xdmf", "curve.csv", "probes.csv", "modes.csv", "summary.json", "log.txt"
@@ -107,12 +108,12 @@ def run_in(path: Path) -> Holding | None:
         try:
             with unlocked(), h5py.File(results, "r", locking=False) as file:
                 return Holding(str(file.attrs["title"]), str(file.attrs.get("hash", "")))
-        except (OSError, KeyError, RuntimeError):
+        except (OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeError):
             pass  # broken by a crash: summary or mark may still tell
     try:
-        said = json.loads((Path(path) / "summary.json").read_text(encoding="utf-8"))
+        said = json.loads(file_text(Path(path) / "summary.json"))
         return Holding(str(said["title"]), str(said.get("hash", "")))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         pass
     mark = read_mark(path)
     return Holding(str(mark["title"]), str(mark.get("hash", ""))) if mark and "title" in mark else None

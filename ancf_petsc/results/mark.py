@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from ancf_petsc.errors import CaseError
+from ancf_petsc.results.tables import file_text
 
 MARK = "running.json"
 SPARE_BYTES = 65536  # blanks at the mark's end: on a full disk, removing the mark makes room for the summary
@@ -87,7 +88,7 @@ class Mark:
 def read_mark(folder: Path) -> dict[str, Any] | None:
     """What a mark says; None without one, empty for one that is not whole."""
     try:
-        text = (Path(folder) / MARK).read_text(encoding="utf-8")
+        text = file_text(Path(folder) / MARK)
     except (OSError, ValueError):
         return None
     with suppress(ValueError):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,12 +15,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ancf_petsc.errors import CaseError, did_you_mean
+from ancf_petsc.mesh.foreign.guard import Refused, check_dataset
 from ancf_petsc.results.folder import unlocked
-from ancf_petsc.results.tables import read_table
+from ancf_petsc.results.tables import file_text, read_table
 from ancf_petsc.results.xdmf import CELL_KINDS, field_name, link_name
 
 if TYPE_CHECKING:
     import pyvista
+
+DAMAGE = (
+    OSError,
+    KeyError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    RuntimeError,
+    IndexError,
+    OverflowError,
+    Refused,
+)
+"""What h5py raises for files that are damaged or not ours."""
 
 Array = NDArray[Any]
 Columns = dict[str, NDArray[np.float64]]
@@ -49,19 +64,21 @@ class Results:
             )
         if not self.path.is_file():
             raise CaseError("no results here", file=folder, expected="a folder that `ancf run` has written")
-        try:
-            with self._open() as file:
-                self._read_names(file)
-        except (OSError, KeyError) as error:
-            raise CaseError(
-                f"cannot be read: {error}",
-                file=self.path,
-                cure="the run may have been killed while it wrote: run again",
-            ) from error
+        with self._reading() as file:
+            self._read_names(file)
 
-    def _open(self) -> h5py.File:
-        with unlocked():
-            return h5py.File(self.path, "r", locking=False)
+    @contextmanager
+    def _reading(self) -> Iterator[h5py.File]:
+        """results.h5, open; what is damaged or missing in it is a CaseError."""
+        try:
+            with unlocked(), h5py.File(self.path, "r", locking=False) as file:
+                yield file
+        except DAMAGE as error:
+            raise self._damaged(" ".join(str(error).split()) or type(error).__name__) from error
+
+    def _damaged(self, what: str) -> CaseError:
+        cure = "the run may have been killed while it wrote, or the file is damaged: run again"
+        return CaseError(f"cannot be read: {what}", file=self.path, cure=cure)
 
     def _read_names(self, file: h5py.File) -> None:
         self.facts = {name: _text(file, name) for name in file.attrs}
@@ -72,9 +89,11 @@ class Results:
         self._steps = sorted((name for name in steps if "time" in steps[name].attrs), key=int)
         self.times = np.array([steps[name].attrs["time"] for name in self._steps], float)
         self.extras = [dict(steps[name].attrs) for name in self._steps]
-        self.node_fields = tuple(map(str, steps.attrs.get("node_fields", ())))
-        self.cell_fields = tuple(map(str, steps.attrs.get("cell_fields", ())))
+        self.node_fields = _names(steps, "node_fields")
+        self.cell_fields = _names(steps, "cell_fields")
         self.fields = self.node_fields + self.cell_fields
+        if self.kind not in CELL_KINDS or self.times.ndim != 1:
+            raise Refused(f"{len(self.times)} steps of {self.kind!r} cells")
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -83,9 +102,9 @@ class Results:
         if not path.is_file():
             return {}
         try:
-            return dict(json.loads(path.read_text(encoding="utf-8")))
-        except ValueError as error:
-            raise CaseError(f"cannot be read: {error}", file=path) from error
+            return dict(json.loads(file_text(path)))
+        except (OSError, ValueError, TypeError, RecursionError) as error:
+            raise CaseError(f"cannot be read: {error}", file=path, cure="run again") from error
 
     @cached_property
     def curve(self) -> Columns:
@@ -112,12 +131,20 @@ class Results:
     @cached_property
     def points(self) -> NDArray[np.float64]:
         """(n, 3) undeformed."""
-        return self._dataset("mesh/points")
+        points = self._dataset("mesh/points")
+        if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f":
+            raise self._damaged(f"points of shape {points.shape}")
+        return points
 
     @cached_property
     def cells(self) -> NDArray[np.int64]:
         """(e, k) indices of points."""
-        return self._dataset("mesh/cells")
+        cells, nodes = self._dataset("mesh/cells"), CELL_KINDS[self.kind].nodes
+        if cells.ndim != 2 or cells.shape[1] != nodes or cells.dtype.kind not in "iu":
+            raise self._damaged(f"{self.kind} cells of shape {cells.shape}")
+        if cells.size and not 0 <= cells.min() <= cells.max() < len(self.points):
+            raise self._damaged("cells have nodes that are not there")
+        return cells
 
     @cached_property
     def node_numbers(self) -> NDArray[np.int64]:
@@ -132,14 +159,24 @@ class Results:
     @cached_property
     def groups(self) -> dict[str, NDArray[np.int64]]:
         """name -> (m,) indices of points."""
-        with self._open() as file:
-            return {field_name(link): nodes[()] for link, nodes in file["mesh/groups"].items()}
+        with self._reading() as file:
+            links = list(file["mesh/groups"])
+        found = {field_name(link): self._dataset(f"mesh/groups/{link}") for link in links}
+        for name, nodes in found.items():
+            inside = nodes.ndim == 1 and nodes.dtype.kind in "iu"
+            if not inside or nodes.size and not 0 <= nodes.min() <= nodes.max() < len(self.points):
+                raise self._damaged(f"the group {name} has nodes that are not there")
+        return found
 
     def field(self, name: str, step: int = -1) -> Array:
         """Values (n, ...) over nodes or (e, ...) over cells at a step, counted from 0 or from the end."""
         if name not in self.fields:
             raise CaseError("no such field", file=self.path, got=name, cure=did_you_mean(name, self.fields))
-        return self._dataset(f"steps/{self._steps[self.step_number(step)]}/{link_name(name)}")
+        values = self._dataset(f"steps/{self._steps[self.step_number(step)]}/{link_name(name)}")
+        rows = len(self.points if name in self.node_fields else self.cells)
+        if values.shape[:1] != (rows,) or values.dtype.kind not in "iuf":
+            raise self._damaged(f"the field {name} has the shape {values.shape} for {rows} rows")
+        return values
 
     def step_at(self, time: float) -> int:
         """The step nearest to a time."""
@@ -170,8 +207,22 @@ class Results:
         return step % count
 
     def _dataset(self, path: str) -> Array:
-        with self._open() as file:
-            return file[path][()]
+        with self._reading() as file:
+            one: Any = file
+            for name in path.split("/"):
+                if isinstance(one.get(name, getlink=True), h5py.ExternalLink):
+                    raise Refused(f"{path} is a link to another file")
+                one = one[name]
+            check_dataset(one)
+            return one[()]
+
+
+def _names(steps: h5py.Group, name: str) -> tuple[str, ...]:
+    """An attribute that lists names."""
+    given = steps.attrs.get(name, ())
+    if isinstance(given, str | bytes) or np.ndim(given) != 1:
+        raise Refused(f"{name} is no list of names")
+    return tuple(map(str, given))
 
 
 def _text(file: h5py.File, name: str) -> str:

@@ -87,12 +87,23 @@ def _exact(value: float) -> str:
     return repr(float(value))
 
 
+def file_text(path: Path) -> str:
+    """The text of a file. Raises OSError, also for pipes and devices, which might never end; UnicodeDecodeError."""
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise OSError(errno.EINVAL, "not an ordinary file", str(path))
+    return Path(path).read_text(encoding="utf-8")
+
+
 def read_table(path: Path) -> dict[str, NDArray[np.float64]]:
     """Columns (rows,) by name, in the file's order. A last line cut short by a crash is left out."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = file_text(path)
     except OSError as error:
         raise CaseError(f"cannot be read: {error.strerror}", file=path) from error
+    except UnicodeDecodeError as error:
+        raise CaseError(
+            f"not a table: byte {error.start} is not UTF-8", file=path, cure="run again"
+        ) from error
     lines = io.StringIO(text[: text.rfind("\n") + 1], newline="")
     names = next(csv.reader(lines), [])  # quoted ones may hold line breaks
     body = lines.read()

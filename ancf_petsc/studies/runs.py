@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -61,7 +61,7 @@ def runs_of(study: Study, runs_folder: Path) -> list[StudyRun]:
         found.setdefault(run.name, replace(run, values=_values(study, changes)))
     for name, source in study.spec.reference.items():
         if source.kind == "run":
-            run = run_of(study, source.changes, f"reference.{name}")
+            run = run_of(study, _with_common(study, source.changes), f"reference.{name}")
             found.setdefault(run.name, replace(run, in_table=False))
     sized = [sized_run(run, runs_folder) for run in _labelled(study, list(found.values()))]
     if all(run.facts is None for run in sized):
@@ -82,18 +82,23 @@ def _labelled(study: Study, runs: list[StudyRun]) -> list[StudyRun]:
 
 
 def combinations(study: Study) -> Iterator[tuple[str, Changes]]:
-    """(where in the file, changes) of the product of [vary], then of each of [[rows]]."""
+    """(where in the file, changes) of the product of [vary], then of each of [[rows]]; those of [set] first."""
     spec = study.spec
     if spec.vary:
         for values in product(*spec.vary.values()):
-            yield "vary", tuple(zip(spec.vary, values, strict=True))
+            yield "vary", _with_common(study, zip(spec.vary, values, strict=True))
     for index, row in enumerate(spec.combinations):
-        yield f"rows.{index}", row
+        yield f"rows.{index}", _with_common(study, row)
+
+
+def _with_common(study: Study, changes: Iterable[tuple[str, Any]]) -> Changes:
+    return tuple({**study.spec.common, **dict(changes)}.items())
 
 
 def reference_run(study: Study, name: str) -> str:
     """The hash of the further run that is a quantity's reference."""
-    return run_of(study, study.spec.reference[name].changes, f"reference.{name}").name
+    changes = _with_common(study, study.spec.reference[name].changes)
+    return run_of(study, changes, f"reference.{name}").name
 
 
 def _values(study: Study, changes: Changes) -> dict[str, Any]:

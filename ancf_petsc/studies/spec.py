@@ -178,6 +178,7 @@ class StudySpec(Table):
     title: Name = key('a title in quotes; such as title = "Element and mesh for the force at 10 mm"')
     note: str = key("a remark in quotes; it stands under every chart", "")
     case: Name = key('a case file; from the study\'s folder, such as "case.toml"')
+    set: dict[Name, Any] = key("a table [set]; paths of keys with a value each, for all runs", {})
     vary: Lists = key("a table [vary]; paths of keys with lists of values", {})
     rows: tuple[dict[Name, Any], ...] = key("tables; write [[rows]]", ())
     quantity: dict[QuantityName, QuantitySpec] = key(
@@ -186,6 +187,11 @@ class StudySpec(Table):
     reference: dict[Name, SourceKey] = key("a table [reference]; of the quantities", {})
     chart: tuple[ChartSpec, ...] = key("tables; write [[chart]]", ())
     timeout: float | None = key("a number > 0; seconds that a run may take", None, gt=0)
+
+    @property
+    def common(self) -> dict[str, Any]:
+        """Path -> value of [set], before what a run changes itself."""
+        return dict(flattened(self.set))
 
     @property
     def combinations(self) -> list[tuple[tuple[str, Any], ...]]:

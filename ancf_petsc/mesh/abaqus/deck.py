@@ -7,13 +7,14 @@ line; `**` begins a comment; *INCLUDE and INPUT= bring in other files. Source: A
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from ancf_petsc.errors import MeshError, did_you_mean
-from ancf_petsc.mesh.text import as_text
+from ancf_petsc.mesh.text import DeckFiles, as_text
 
 STAR = re.compile(r"^[ \t]*\*.*$", re.MULTILINE)
 PARAMETER = re.compile(r'\s*([^,="]+?)\s*(?:=\s*("[^"]*"|[^,]*))?\s*(?:,|$)')
@@ -108,6 +109,7 @@ class _Deck:
     def __init__(self, path: Path, notes: list[str]) -> None:
         self.path = path
         self.notes = notes
+        self.files = DeckFiles()
 
     def cards(self) -> Iterator[KeywordCard]:
         current: KeywordCard | None = None
@@ -133,15 +135,7 @@ class _Deck:
             yield current
 
     def _load(self, path: Path) -> Source:
-        try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise MeshError(
-                f"cannot be read ({error.strerror or error})",
-                file=str(path),
-                key="mesh.file",
-                cure="mend the deck",
-            ) from None
+        data = self.files.read(path)
         return Source(path, as_text(data, path, self.notes).replace("\r\n", "\n").replace("\r", "\n"))
 
     def _items(self, source: Source, above: tuple[Path, ...]) -> Iterator[KeywordCard | Piece]:
@@ -188,8 +182,8 @@ class _Deck:
     def _included(
         self, card: KeywordCard, target: Path, above: tuple[Path, ...]
     ) -> Iterator[KeywordCard | Piece]:
-        resolved = target.resolve()
-        if resolved in [path.resolve() for path in above] or len(above) > DEEPEST:
+        resolved = os.path.realpath(target)
+        if resolved in [os.path.realpath(path) for path in above] or len(above) > DEEPEST:
             raise card.error(f"{target} includes itself", cure="take the *INCLUDE out")
         yield from self._items(self._load(target), above)
 
@@ -198,7 +192,7 @@ class _Deck:
         name = value.strip().strip('"').strip()
         if "\0" not in name and name:
             for folder in (card.source.path.parent, self.path.parent):
-                if (folder / name).is_file():
+                if os.path.isfile(folder / name):
                     return folder / name
         raise card.error(
             "there is no such file",

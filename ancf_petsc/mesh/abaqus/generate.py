@@ -14,8 +14,8 @@ from ancf_petsc.mesh.abaqus.scope import Elements, Listed, Nodes, Reader
 from ancf_petsc.mesh.abaqus.sets import of_set
 from ancf_petsc.mesh.mesh import Floats, Integers
 
-MOST = 50_000_000
-"""Nodes or elements that one card may make: more is a slip of the pen."""
+MOST = 20_000_000
+"""Numbers that the cards of a deck may make, four a node, and one more than its nodes an element: more is a slip of the pen."""
 
 
 def _whole_fields(card: KeywordCard, line: Line, text: str, least: int, most: int) -> list[int]:
@@ -34,9 +34,14 @@ def _whole_fields(card: KeywordCard, line: Line, text: str, least: int, most: in
     return numbers
 
 
-def _limit(card: KeywordCard, count: int) -> None:
-    if count > MOST:
-        raise card.error("makes more nodes or elements than fit", got=count, expected=f"at most {MOST}")
+def _limit(reader: Reader, card: KeywordCard, count: int, width: int = 4) -> None:
+    """Add what a card makes, `width` numbers each. Raises MeshError beyond MOST."""
+    reader.made += count * width
+    if reader.made > MOST:
+        kind = "elements" if card.name.startswith("EL") else "nodes"
+        raise card.error(
+            f"makes more {kind} than fit", got=count, expected=f"at most {MOST // width} in a deck"
+        )
 
 
 def _places(reader: Reader, card: KeywordCard, numbers: Integers) -> Floats:
@@ -65,7 +70,7 @@ def nodes_between(reader: Reader, card: KeywordCard) -> None:
                 "a data line", line=line, got=text.strip(), expected="first < last, and a step that divides"
             )
         count = (last - first) // step
-        _limit(card, count)
+        _limit(reader, card, count)
         ends = _places(reader, card, np.array([first, last]))
         share = np.arange(1, count)[:, None] / count
         numbers = np.arange(first + step, last, step)
@@ -94,7 +99,7 @@ def fill(reader: Reader, card: KeywordCard) -> None:
             raise card.error(
                 "the two sets", line=line, got=[len(s) for s in sets], expected="equally many nodes"
             )
-        _limit(card, intervals * len(sets[0]))
+        _limit(reader, card, intervals * len(sets[0]))
         start, stop = (_places(reader, card, numbers) for numbers in sets)
         for k in range(1, intervals):
             numbers = sets[0] + k * (step or 1)
@@ -113,7 +118,7 @@ def copy_nodes(reader: Reader, card: KeywordCard) -> None:
     step = _number(card, given, "CHANGENUMBER")
     times = _number(card, given, "MULTIPLE") if "MULTIPLE" in given else 1
     numbers = of_set(reader, card, "node", label(card.needed(given, "OLDSET")))
-    _limit(card, times * len(numbers))
+    _limit(reader, card, times * len(numbers))
     points = _places(reader, card, numbers)
     rotation, shift = motion(card)
     new = []
@@ -141,8 +146,8 @@ def elements(reader: Reader, card: KeywordCard) -> None:
         numbers += [0] * (10 - len(numbers))
         master, counts = numbers[0], [max(n, 1) for n in numbers[1::3]]
         node_steps, element_steps = [n or 1 for n in numbers[2::3]], [n or 1 for n in numbers[3::3]]
-        _limit(card, int(np.prod(counts, dtype=object)))
         block, row = _find(reader, card, master, line)
+        _limit(reader, card, int(np.prod(counts, dtype=object)), 1 + block.nodes.shape[1])
         grid = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3)[
             1:
         ]
@@ -173,6 +178,7 @@ def copy_elements(reader: Reader, card: KeywordCard) -> None:
     for block in list(reader.scope.elements):
         rows = np.isin(block.numbers, numbers)
         if rows.any():
+            _limit(reader, card, int(rows.sum()), 1 + block.nodes.shape[1])
             copied = Elements(
                 block.title, block.type, block.numbers[rows] + shift, block.nodes[rows] + by, card
             )

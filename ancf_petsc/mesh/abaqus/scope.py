@@ -157,6 +157,7 @@ class Reader:
     """What the cards so far have said. scope: where nodes, elements and sets are entered.
 
     open_instance: key of the instance that is being read, and its part. beyond: elements that are no cells, by type.
+    made: numbers that cards have made of others.
     """
 
     def __init__(self) -> None:
@@ -169,3 +170,4 @@ class Reader:
         self.beyond: dict[str, int] = {}
         self.refused: dict[str, str] = {}
         self.skipped: dict[str, str] = {}
+        self.made = 0

@@ -13,6 +13,9 @@ from ancf_petsc.mesh.abaqus.deck import KeywordCard
 from ancf_petsc.mesh.abaqus.scope import Instance, Listed, Member, Range, Reader, Reference, Scope
 from ancf_petsc.mesh.mesh import Integers
 
+DEEPEST = 100
+"""Sets in sets: more would exceed Python's stack."""
+
 Found = dict[str, list[Integers]]
 
 
@@ -84,6 +87,12 @@ class Resolver:
         if (id(owner), kind, key) in above:
             raise member.card.error(
                 f"the set {member.label.shown} contains itself", line=member.line, cure="break the circle"
+            )
+        if len(above) >= DEEPEST:
+            raise member.card.error(
+                f"the set {member.label.shown} is the last of {DEEPEST} that are members of each other",
+                line=member.line,
+                cure="give its members themselves",
             )
         if key in owner.sets[kind]:
             numbers = self._set(owner, kind, key, above)

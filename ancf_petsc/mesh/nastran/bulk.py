@@ -7,16 +7,18 @@ Source: MSC Nastran Quick Reference Guide, "Format of Bulk Data Entries".
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from ancf_petsc.errors import MeshError
 from ancf_petsc.mesh.mesh import Floats, Integers
-from ancf_petsc.mesh.text import as_text
+from ancf_petsc.mesh.text import DeckFiles, as_text
 
 DEEPEST = 32
 LARGEST = 1e100
@@ -53,31 +55,31 @@ class Card:
         return self.line.error(f"{self.name}: {problem}", **facts)
 
 
+class BulkData(NamedTuple):
+    """What is known while a deck is read. folder: of its main file; notes, comments: gathered from all of its files."""
+
+    folder: Path
+    notes: list[str]
+    comments: list[str]
+    files: DeckFiles
+
+
 def read_bulk(path: Path, notes: list[str]) -> tuple[list[Card], list[str]]:
     """Cards of the bulk data, and the comments of the file. Raises MeshError with file and line."""
     comments: list[str] = []
-    lines = list(_bulk(list(_lines(path, path.parent, notes, comments, (path.resolve(),)))))
+    deck = BulkData(path.parent, notes, comments, DeckFiles())
+    lines = list(_bulk(list(_lines(path, deck, (os.path.realpath(path),)))))
     return list(_cards(lines)), comments
 
 
-def _lines(
-    path: Path, main: Path, notes: list[str], comments: list[str], above: tuple[Path, ...]
-) -> Iterator[Line]:
+def _lines(path: Path, deck: BulkData, above: tuple[str, ...]) -> Iterator[Line]:
     """The lines of a file and of those it includes, comments and empty lines left out."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise MeshError(
-            f"cannot be read ({error.strerror or error})",
-            file=str(path),
-            key="mesh.file",
-            cure="mend the deck",
-        ) from None
+    data = deck.files.read(path)
     pending: Line | None = None
-    for number, raw in enumerate(as_text(data, path, notes).splitlines(), 1):
+    for number, raw in enumerate(as_text(data, path, deck.notes).splitlines(), 1):
         text, mark, comment = raw.partition("$")
         if mark:
-            comments.append(comment)
+            deck.comments.append(comment)
         if not text.strip():
             continue
         line = Line(text.rstrip(), number, path)
@@ -87,24 +89,22 @@ def _lines(
             if line.text.count("'") == 1 or line.text.count('"') == 1:
                 pending = line
                 continue
-            yield from _included(line, main, notes, comments, above)
+            yield from _included(line, deck, above)
         else:
             yield line
     if pending:
         raise pending.error("INCLUDE: the name of the file has no end", cure="close the quotes")
 
 
-def _included(
-    line: Line, main: Path, notes: list[str], comments: list[str], above: tuple[Path, ...]
-) -> Iterator[Line]:
+def _included(line: Line, deck: BulkData, above: tuple[str, ...]) -> Iterator[Line]:
     found = INCLUDE.match(line.text)
     name = found[1].strip() if found else ""
-    for folder in (line.path.parent, main):
+    for folder in (line.path.parent, deck.folder):
         target = folder / name
-        if name and "\0" not in name and target.is_file():
-            if target.resolve() in above or len(above) > DEEPEST:
+        if name and "\0" not in name and os.path.isfile(target):
+            if os.path.realpath(target) in above or len(above) > DEEPEST:
                 raise line.error(f"INCLUDE: {name} includes itself", cure="take the INCLUDE out")
-            yield from _lines(target, main, notes, comments, (*above, target.resolve()))
+            yield from _lines(target, deck, (*above, os.path.realpath(target)))
             return
     raise line.error(
         "INCLUDE: there is no such file",

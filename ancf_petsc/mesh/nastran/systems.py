@@ -27,6 +27,9 @@ class CoordinateSystem(NamedTuple):
         return rectangular(self.kind, given) @ self.axes + self.origin
 
 
+DEEPEST = 100
+"""Systems in systems: more would exceed Python's stack."""
+
 BASIC = CoordinateSystem("R", np.zeros(3), np.eye(3))
 
 
@@ -66,6 +69,11 @@ class Systems:
             )
         if number in above:
             raise asked_by.error(f"coordinate system {number} is defined by itself", cure="break the circle")
+        if len(above) >= DEEPEST:
+            raise asked_by.error(
+                f"coordinate system {number} is the last of {DEEPEST} that are defined in each other",
+                cure="define it in the basic system",
+            )
         card, start = self._cards[number]
         above = (*above, number)
         if card.name.startswith("CORD1"):
