@@ -51,7 +51,7 @@ class CaseError(AncfError):
         where = [str(part) for part in (self.file, self.key) if part]
         facts = []
         if self.got is not None:
-            facts.append(f"found {self.got!r}")
+            facts.append(f"found {_plain(self.got)!r}")
         if self.expected:
             facts.append(f"expected {self.expected}")
         middle = [part for part in (self.problem, ", ".join(facts)) if part]
@@ -61,6 +61,13 @@ class CaseError(AncfError):
     def __reduce__(self) -> tuple:
         """Errors travel between ranks by pickle, keyword arguments included."""
         return (_rebuild, (type(self), self.problem, self.file, self.key, self.got, self.expected, self.cure))
+
+
+def _plain(value: Any) -> Any:
+    """numpy's numbers and arrays, also in a list or a tuple, as Python's: numpy 2 writes np.float64(0.5)."""
+    if type(value) in (list, tuple):
+        return type(value)(map(_plain, value))
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def _rebuild(kind: type[CaseError], problem, file, key, got, expected, cure) -> CaseError:
