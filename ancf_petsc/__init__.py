@@ -35,20 +35,30 @@ _HOMES = {
     "Interrupted": "ancf_petsc.errors",
     "MeshError": "ancf_petsc.errors",
     "NoEquilibrium": "ancf_petsc.errors",
+    "study": "ancf_petsc.studies.drawn",
 }
 __all__ = ["run", *_HOMES]
 
 
-def run(case: Case, folder: str | Path | None = None, *, force: bool = False) -> Results:
+def run(
+    case: Case,
+    folder: str | Path | None = None,
+    *,
+    force: bool = False,
+    restart: bool = False,
+    extend: bool = False,
+) -> Results:
     """Solve a case, on all ranks of the program, and open its results.
 
-    folder: where the results go, default results/NAME. force: overwrite a folder that holds something else.
+    folder: where the results go, default results/NAME. force: overwrite a folder that holds something else. restart: go on
+    from the last checkpoint in the folder, or start where there is none. extend: though the case now asks for a longer duration,
+    more outputs or other options of PETSc.
     Raises CaseError, NoEquilibrium, Interrupted.
     """
     from ancf_petsc.analysis.run import run_case
     from ancf_petsc.results.reader import open_results
 
-    return open_results(run_case(case, folder, force=force))
+    return open_results(run_case(case, folder, force=force, restart=restart, extend=extend))
 
 
 def __getattr__(name: str) -> Any:

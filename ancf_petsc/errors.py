@@ -8,10 +8,11 @@ from __future__ import annotations
 import errno
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 SHORT, LONG = 300, 1200
 """Letters of a word of the input that a message repeats, and of a list of what there is."""
@@ -53,7 +54,7 @@ class CaseError(AncfError):
         where = [shortened(str(part), LONG) for part in (self.file, self.key) if part]
         facts = []
         if self.got is not None:
-            facts.append(f"found {shortened(_shown(self.got), SHORT)}")
+            facts.append(f"found {shortened(_shown(_plain(self.got)), SHORT)}")
         if self.expected:
             facts.append(f"expected {shortened(self.expected, LONG)}")
         middle = [part for part in (shortened(self.problem, LONG), ", ".join(facts)) if part]
@@ -65,6 +66,13 @@ class CaseError(AncfError):
         return (_rebuild, (type(self), self.problem, self.file, self.key, self.got, self.expected, self.cure))
 
 
+def _plain(value: Any) -> Any:
+    """numpy's numbers and arrays, also in a list or a tuple, as Python's: numpy 2 writes np.float64(0.5)."""
+    if type(value) in (list, tuple):
+        return type(value)(map(_plain, value))
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
 def _rebuild(kind: type[CaseError], problem, file, key, got, expected, cure) -> CaseError:
     return kind(problem, file=file, key=key, got=got, expected=expected, cure=cure)
 
@@ -73,16 +81,22 @@ class MeshError(CaseError):
     """The mesh cannot be read or cannot be computed with."""
 
 
-class NoEquilibrium(AncfError):
+class Stopped(AncfError):
+    """What ended a path or a motion early. facts: its kind and what is known of it, for `end` of the summary."""
+
+    exit_code = 3
+
+    def __init__(self, message: str, facts: Mapping[str, Any] | None = None) -> None:
+        super().__init__(message)
+        self.facts = dict(facts or {})
+
+
+class NoEquilibrium(Stopped):
     """The load path ends: no further state was found. Everything up to here is saved."""
 
-    exit_code = 3
 
-
-class MotionStopped(AncfError):
+class MotionStopped(Stopped):
     """The motion cannot be followed further: a step failed or numbers are not finite. What was before is saved."""
-
-    exit_code = 3
 
 
 class EnvironmentProblem(AncfError):

@@ -18,6 +18,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any
@@ -29,6 +30,23 @@ from numba import types
 from numba.core.dispatcher import Dispatcher
 from numba.core.typing.templates import Signature
 from numba.extending import intrinsic, overload, register_jitable
+
+
+def _start_without_blas() -> None:
+    """Load numba's functions of arrays without SciPy's linear algebra, which would take a fifth of a run's start.
+
+    numba looks for it only to choose between two loops of `np.kron`, and imports it when a kernel takes a product of matrices.
+    """
+    blas = "scipy.linalg.cython_blas"
+    if blas not in sys.modules:
+        sys.modules[blas] = None  # type: ignore[assignment]  # so that importing it is an ImportError
+        try:
+            import_module("numba.np.arraymath")
+        finally:
+            del sys.modules[blas]
+
+
+_start_without_blas()
 
 PACKAGE = Path(__file__).parent
 SOURCES = ("algebra", "kernel", "material")

@@ -63,33 +63,38 @@ def on_ranks(count: int, command: Sequence[str]) -> list[str]:
 # fmt: off
 GENERAL_OPTIONS = frozenset(
     {
-        "blas_num_threads", "blas_view", "check_pointer_intensity", "checkfunctionlist",
-        "checkstack", "citations", "cuda_device", "debugger_nodes", "debugger_pause",
-        "debugger_ranks", "default_device_type", "device_context_device_type",
-        "device_context_stream_type", "device_enable", "device_select", "device_view", "display",
-        "error_output_none", "error_output_stdout", "fp_trap", "get_total_flops", "help",
-        "hip_device", "history", "info", "info_exclude", "log_all", "log_exclude",
-        "log_exclude_actions", "log_include", "log_include_actions", "log_mpe", "log_nvtx",
-        "log_perfstubs", "log_roctx", "log_summary", "log_sync", "log_threadsafe", "log_trace",
-        "log_view", "log_view_gpu_time", "log_view_memory", "malloc", "malloc_coalesce",
-        "malloc_debug", "malloc_dump", "malloc_hbw", "malloc_info", "malloc_log",
-        "malloc_log_threshold", "malloc_requested_size", "malloc_test", "malloc_view",
-        "malloc_view_threshold", "memory_info", "memory_view", "mpi_return_on_error", "mpidump",
-        "mpiuni-allow-multiprocess-launch", "no_signal_handler", "not_shared_tmp", "nox",
-        "nox_warning", "objects_dump", "on_error_abort", "on_error_attach_debugger",
-        "on_error_emacs", "on_error_mpiabort", "options_file", "options_file_yaml", "options_left",
+        "blas_num_threads", "blas_view", "check_pointer_intensity",
+        "checkfunctionlist", "checkstack", "citations", "cuda_device",
+        "debug_terminal", "debugger_nodes", "debugger_pause", "debugger_ranks",
+        "default_device_type", "device_context_device_type",
+        "device_context_stream_type", "device_enable", "device_select", "device_view",
+        "display", "error_output_none", "error_output_stdout", "fp_trap",
+        "get_total_flops", "help", "hip_device", "history", "info", "info_exclude",
+        "log_all", "log_exclude", "log_exclude_actions", "log_include",
+        "log_include_actions", "log_mpe", "log_nvtx", "log_perfstubs", "log_roctx",
+        "log_summary", "log_sync", "log_threadsafe", "log_trace", "log_view",
+        "log_view_gpu_energy", "log_view_gpu_energy_meter", "log_view_gpu_time",
+        "log_view_memory", "malloc", "malloc_coalesce", "malloc_debug", "malloc_dump",
+        "malloc_hbw", "malloc_info", "malloc_log", "malloc_log_threshold",
+        "malloc_requested_size", "malloc_test", "malloc_view",
+        "malloc_view_threshold", "memory_info", "memory_view", "mpi_return_on_error",
+        "mpidump", "mpiuni-allow-multiprocess-launch", "no_signal_handler",
+        "not_shared_tmp", "nox", "nox_warning", "objects_dump", "omp_num_threads",
+        "omp_view", "on_error_abort", "on_error_attach_debugger", "on_error_emacs",
+        "on_error_mpiabort", "options_file", "options_file_yaml", "options_left",
         "options_monitor", "options_monitor_cancel", "options_string_yaml",
-        "options_suppress_deprecated_warnings", "options_table", "options_view", "petsc_ci",
-        "petsc_ci_portable_error_output", "prefix_pop", "prefix_push", "python",
-        "root_device_context_device_type", "root_device_context_stream_type", "saws_options",
-        "shared_tmp", "skip_petscrc", "splitreduction_async", "start_in_debugger",
+        "options_suppress_deprecated_warnings", "options_table", "options_view",
+        "petsc_ci", "petsc_ci_portable_error_output", "prefix_pop", "prefix_push",
+        "process_view", "python", "root_device_context_device_type",
+        "root_device_context_stream_type", "saws_options", "shared_tmp",
+        "skip_petscrc", "splitreduction_async", "stack_view", "start_in_debugger",
         "stop_for_debugger", "sycl_device", "tmp", "use_gpu_aware_mpi", "version",
         "viewfromoptions", "x_virtual",
     }
 )
 # fmt: on
 """What PETSc itself reads, whatever a program does: at its start, at its end, and of its log, memory and errors
-(PetscInitialize and PetscFinalize, releases 3.18 to 3.24). Without the leading dash.
+(PetscInitialize and PetscFinalize, releases 3.18 to 3.26). Without the leading dash.
 """
 
 

@@ -127,12 +127,14 @@ def configure(folder: str | Path | None = None, rank: int = 0, verbosity: int = 
         attach_file(Path(folder) / "log.txt")
 
 
-def attach_file(path: str | Path) -> None:
-    """Write all lines, those so far too, to a new file. Does nothing where `configure` made no log."""
+def attach_file(path: str | Path, mode: str = "w") -> None:
+    """Write all lines, those so far too, to a new file, or, with mode "a", to the end of one. Does nothing where `configure`
+    made no log.
+    """
     waiting = [handler for handler in LOGGER.handlers if isinstance(handler, _Pending)]
     if not waiting:
         return
-    file = _File(path, mode="w", encoding="utf-8")
+    file = _File(path, mode=mode, encoding="utf-8")
     file.setFormatter(_Lines())
     for pending in waiting:
         LOGGER.removeHandler(pending)
@@ -142,8 +144,8 @@ def attach_file(path: str | Path) -> None:
 
 
 @contextmanager
-def log_file(path: Path, rank: int) -> Iterator[None]:
-    """Write all lines of a block, and those that waited for a file, to a new file on the root rank."""
+def log_file(path: Path, rank: int, mode: str = "w") -> Iterator[None]:
+    """Write all lines of a block, and those that waited for a file, to a file on the root rank; mode as `attach_file`."""
     if rank:
         yield
         return
@@ -152,7 +154,7 @@ def log_file(path: Path, rank: int) -> Iterator[None]:
     before = set(LOGGER.handlers)
     if not any(isinstance(handler, _Pending) for handler in before):
         LOGGER.addHandler(_Pending())
-    attach_file(path)
+    attach_file(path, mode)
     try:
         yield
     finally:

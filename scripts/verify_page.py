@@ -1,4 +1,4 @@
-"""docs/verification.md from docs/verification/checks.json, mutations.json and fuzz.json."""
+"""docs/verification.md from docs/verification/*.json."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from typing import Any
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 CHECKS, MUTATIONS = DOCS / "verification" / "checks.json", DOCS / "verification" / "mutations.json"
-FUZZ = DOCS / "verification" / "fuzz.json"
+PLATFORMS, FUZZ = DOCS / "verification" / "platforms.json", DOCS / "verification" / "fuzz.json"
+KILLS, LEAKS = DOCS / "verification" / "kills.json", DOCS / "verification" / "leaks.json"
 PAGE = DOCS / "verification.md"
 HEAD = """# Verification
 
 *Made by `scripts/verify` from `docs/verification/`; do not edit.* `scripts/verify` computes every number under *found* again and
-ends with exit code 1 if an error is beyond its bound. `scripts/fuzz` makes the table of damaged inputs, `scripts/mutate` that of
-wrong changes.
+ends with exit code 1 if an error is beyond its bound. `scripts/test_debian` and `scripts/test_current_petsc` make the table of
+platforms, `scripts/soak_kills` and `scripts/soak_leaks` those of kills and leaks, `scripts/fuzz` that of damaged inputs,
+`scripts/mutate` the last one.
 """
 
 
@@ -54,6 +56,65 @@ def checks_part(data: dict[str, Any]) -> list[str]:
                 lines.append("| " + " | ".join(cell(word) for word in words) + " |")
             lines.append("")
     return lines
+
+
+def platforms_part(rows: list[dict[str, Any]]) -> list[str]:
+    """How the suite ended on each PETSc and MPI it was last run on."""
+    lines = ["## Where the test suite ran", ""]
+    lines += [
+        "| PETSc, SLEPc | MPI | system, Python | numpy, h5py | PETSc has | date | passed | failed | skipped |"
+    ]
+    lines += ["|---|---|---|---|---|---|---|---|---|"]
+    for row in rows:
+        parallel = " with MPI" if row["h5py_with_mpi"] else " without MPI"
+        words = (
+            f"{row['petsc']}, {row['slepc']}",
+            row["mpi"],
+            f"{row['system']}, {row['python']}",
+            f"{row['numpy']}, {row['h5py']}{parallel}",
+            ", ".join(row["packages"]),
+            row["date"],
+            str(row["passed"]),
+            f"**{row['failed']}**: {', '.join(row['failures'])}" if row["failed"] else "0",
+            str(row["skipped"]),
+        )
+        lines.append("| " + " | ".join(cell(word) for word in words) + " |")
+    return [*lines, ""]
+
+
+def kills_part(rows: list[dict[str, Any]]) -> list[str]:
+    """Runs that were killed, and what was lost."""
+    lines = [
+        "## Kills and power cuts",
+        "",
+        "`scripts/soak_kills` kills runs at random moments, on several ranks one of them or all, cuts files at random lengths as a "
+        "power cut may, and lets each go on until it ends. Differences are those from the uninterrupted run on one rank: of all "
+        "fields, over the largest number of each; no step is missing and none is there twice.",
+        "",
+        "| what | ranks | kills survived | power cuts | runs | equal to the last bit | largest difference |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    names = ("what", "ranks", "kills", "power_cuts", "runs", "equal_to_the_bit")
+    for row in rows:
+        words = (*(str(row[name]) for name in names), brief(row["largest_difference"]))
+        lines.append("| " + " | ".join(map(cell, words)) + " |")
+    return [*lines, ""]
+
+
+def leaks_part(rows: list[dict[str, Any]]) -> list[str]:
+    """What grew over many steps and runs."""
+    lines = [
+        "## Memory and handles",
+        "",
+        "`scripts/soak_leaks`: growth from the first quarter of the work to its end.",
+        "",
+        "| what | done | resident memory, MB | open files and threads |",
+        "|---|---|---|---|",
+    ]
+    for row in rows:
+        words = (row["what"], str(row["done"]), brief(row["memory_growth_mb"]), str(row["handles_growth"]))
+        lines.append("| " + " | ".join(map(cell, words)) + " |")
+    return [*lines, ""]
 
 
 def mutations_part(rows: list[dict[str, Any]]) -> list[str]:
@@ -133,9 +194,9 @@ def write_page() -> Path:
     lines = [HEAD]
     if CHECKS.is_file():
         lines += checks_part(json.loads(CHECKS.read_text()))
-    if FUZZ.is_file():
-        lines += fuzz_part(json.loads(FUZZ.read_text()))
-    if MUTATIONS.is_file():
-        lines += mutations_part(json.loads(MUTATIONS.read_text()))
+    several = ((PLATFORMS, platforms_part), (KILLS, kills_part), (LEAKS, leaks_part), (FUZZ, fuzz_part))
+    for file, part in (*several, (MUTATIONS, mutations_part)):
+        if file.is_file():
+            lines += part(json.loads(file.read_text()))
     PAGE.write_text("\n".join(lines).rstrip("\n") + "\n", encoding="utf-8")
     return PAGE

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Writes docs/performance.md and its charts from docs/benchmarks/*.json. All numbers in it come from there.
+"""Writes docs/performance.md from docs/benchmarks/*.json. All numbers in it come from there.
 
 ancf bench --json docs/benchmarks/bench.json                            # 5 minutes on two quiet cores
-ancf bench accuracy stroke iterations scaling --json docs/benchmarks/sweeps.json    # 20 minutes
+ancf bench iterations scaling --json docs/benchmarks/sweeps.json           # 10 minutes
 ancf bench alternatives --json docs/benchmarks/alternatives.json        # 3 minutes
 scripts/bench_peers.py --json docs/benchmarks/peers.json
 scripts/write_performance.py
@@ -11,13 +11,11 @@ scripts/write_performance.py
 from __future__ import annotations
 
 import json
-import re
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from performance_charts import best_forces, draw_accuracy, draw_strokes, sweep
 from scaling_model import TWO_LEVEL_RANKS, Model
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -42,7 +40,6 @@ def main() -> int:
     pieces = [*head(bench), *targets(bench["results"]), *misses(bench["results"])]
     pieces += [
         *side_by_side(peers),
-        *charts(results),
         *solvers(results),
         *alternatives(results),
         *scaling(results),
@@ -201,55 +198,12 @@ def side_by_side(peers: Report) -> list[str]:
     return [*lines, ""]
 
 
-def charts(results: Report) -> list[str]:
-    lines = []
-    if sweep(results, "accuracy"):
-        draw_accuracy(results, STORE / "accuracy.png")
-        best = [
-            f"{body} {law} {1e-3 * force:.6g} kN ({mesh})"
-            for (law, body), (force, mesh) in best_forces(results).items()
-        ]
-        lines += [
-            "## Speed against accuracy",
-            "",
-            "![Error of the force against seconds](benchmarks/accuracy.png)",
-            "",
-        ]
-        lines += [
-            f"Errors are against the finest run of quadratic tetrahedra, forces of the quarter: {', '.join(best)}.",
-            "",
-        ]
-        failed = [f"`{name}`" for name, found in results.items() if cannot(name, found)]
-        lines += (
-            [f"Stopped before the full stroke, reasons in docs/benchmarks: {', '.join(failed)}.", ""]
-            if failed
-            else []
-        )
-    if sweep(results, "stroke"):
-        draw_strokes(results, STORE / "stroke.png")
-        lines += [
-            "## Where the method fails",
-            "",
-            "![Stroke that is reached against mesh size](benchmarks/stroke.png)",
-            "",
-        ]
-        lines += ["A triangle: the path went on to the end that was asked for, 80 mm.", ""]
-        rows = [
-            (*rest, 1e3 * found["median"], ending(found["facts"]["why"]))
-            for rest, found in sweep(results, "stroke").items()
-        ]
-        lines += table(("law", "mesh", "stroke, mm", "why it ends"), rows)
-    return lines
-
-
-def ending(why: str) -> str:
-    """The stretch at which a path ended, from its message."""
-    found = re.search(r"smallest stretch (\S+), det F (\S+?);", why)
-    return f"smallest stretch {found[1]}, det F {found[2]}" if found else why
-
-
-def cannot(name: str, found: Report) -> bool:
-    return name.startswith("accuracy/") and "problem" in found
+def sweep(results: Report, name: str) -> dict[tuple[str, ...], Report]:
+    """Results whose name begins with `name`, by the rest of it, without those that could not run."""
+    found = {
+        tuple(full.split("/")[1:]): result for full, result in results.items() if full.startswith(f"{name}/")
+    }
+    return {rest: result for rest, result in found.items() if "problem" not in result}
 
 
 def solvers(results: Report) -> list[str]:

@@ -17,8 +17,10 @@ from mpi4py import MPI
 from ancf_petsc import case_from_dict
 from ancf_petsc.analysis.build import build
 from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.solve.critical import Watch
 from ancf_petsc.solve.newton import Newton
-from ancf_petsc.solve.stability import weakest_cell, why_it_ends
+from ancf_petsc.solve.stability import Last, why_it_ends
+from ancf_petsc.solve.weakest import weakest_cell
 
 WAVES = np.array(
     [[31.0, 7.0, -19.0], [11.0, -37.0, 23.0], [-13.0, 29.0, 41.0]]
@@ -36,10 +38,17 @@ def describe(data: dict[str, Any], state: dict[str, Any], comm: MPI.Comm) -> dic
     newton = Newton(assembly, 1e-8)
     x = assembly.reference_vector()
     x.array[:] = placed(assembly.model.reference[: assembly.model.owned], **state).ravel()
-    stretch, det, cell, centroid, law = weakest_cell(assembly, x)
+    weakest = weakest_cell(assembly, x)
+    watch = Watch(newton)
+    start = assembly.reference_vector()
+    newton.tangent_at(start)
+    watch.begin(0.0)
+    error = why_it_ends(newton, watch, Last(0.25, x, "no convergence", 1e-4, 0.3, (0.25, x)))
+    watch.destroy()
     found = {
-        "line": why_it_ends(newton, x, 0.25, "no convergence", 1e-4),
-        "weakest": [cell, stretch, det, centroid.tolist(), law],
+        "line": str(error),
+        "facts": error.facts,
+        "weakest": [weakest.cell, weakest.stretch, weakest.det, weakest.place.tolist(), weakest.law],
     }
     if comm.size == 1:
         rows, n = newton.matrix.mat, newton.matrix.mat.getSize()[0]

@@ -25,7 +25,7 @@ def mesh_of(body: str, code: str, divisions: tuple[int, int, int], folder: Path,
     """A mesh of one of the project's bodies with the cells of an element."""
     kind = element(code).cell_name
     path = folder / f"{body}_{kind}{order}_{'_'.join(map(str, divisions))}.msh"
-    flat = kind if kind in ("quad", "line") else ""
+    flat = kind if kind in ("triangle", "quad", "line") else ""
     return make_mesh(body, path, divisions=divisions, hexahedra=kind == "hexahedron", flat=flat, order=order)
 
 
@@ -40,7 +40,7 @@ def cantilever(mesh: Path, code: str, *, steps: int = 1, **mesh_keys: Any) -> di
         "statics": {"steps": steps},
         "probe": [{"name": "end", "group": "end", "mean": "area"}],
     }
-    return case | ({"section": SECTION} if element(code).cell_name == "quad" else {})
+    return case | ({"section": SECTION} if element(code).is_plane else {})
 
 
 def unit_cube(code: str, n: int, folder: Path, *, odd: bool = False) -> Path:
@@ -50,14 +50,18 @@ def unit_cube(code: str, n: int, folder: Path, *, odd: bool = False) -> Path:
     if odd:
         for axis in steps:
             axis[1:-1] += generator.uniform(-0.2, 0.2, n - 1) / n
-    if kind == "quad":
+    if kind in ("triangle", "quad"):
         x, y = np.meshgrid(steps[0], steps[1])
         index = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
         cells = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(
             -1, 4
         )
         points = np.stack((x.ravel(), y.ravel(), np.zeros(x.size)), axis=1)
-    else:
+        inner = ((points[:, :2] > 1e-9) & (points[:, :2] < 1 - 1e-9)).all(axis=1)
+    if kind == "triangle":
+        cells = cells[:, ((0, 1, 2), (0, 2, 3))].reshape(-1, 3)
+        points[inner, :2] += odd * 0.06 * generator.uniform(-1, 1, (int(inner.sum()), 2))
+    if kind not in ("triangle", "quad"):
         z, y, x = np.meshgrid(*steps[::-1], indexing="ij")
         points, cells = bricks(np.stack((x, y, z), axis=-1))
     if kind == "tetra":
@@ -66,7 +70,7 @@ def unit_cube(code: str, n: int, folder: Path, *, odd: bool = False) -> Path:
         points[inner] += odd * 0.06 * generator.uniform(-1, 1, (int(inner.sum()), 3))
     if odd:
         shear = np.array([[1.0, 0.2, 0.1], [0.0, 0.9, -0.2], [0.1, 0.0, 1.2]])
-        d = 2 if kind == "quad" else 3
+        d = 2 if kind in ("triangle", "quad") else 3
         points[:, :d] = points[:, :d] @ shear[:d, :d].T
     path = folder / f"cube_{kind}_{n}_{odd}.vtu"
     meshio.Mesh(points, [(kind, cells)]).write(path)
@@ -90,13 +94,13 @@ def held_all_around(code: str, mesh: Path, folder: Path, law: str = "svk", **mes
         "constraint": [{"group": "boundary", "fix": ["x", "y", "z"][: row.components]}],
         "statics": {"steps": 1},
     }
-    if row.cell_name == "quad":
+    if row.is_plane:
         data["section"] = {"thickness": 1.0, "plane": "strain"}
     return Assembly(build(case_from_dict(data, folder), MPI.COMM_SELF).model)
 
 
 def _write_with_sides(path: Path, points: Any, kind: str, cells: Any, sides: Any) -> None:
-    side = {"quad": "line", "tetra": "triangle", "hexahedron": "quad"}[kind]
+    side = {"triangle": "line", "quad": "line", "tetra": "triangle", "hexahedron": "quad"}[kind]
     tags = [np.full(len(sides), 1), np.full(len(cells), 2)]
     dimension = {"line": 1, "triangle": 2, "quad": 2}[side]
     meshio.Mesh(

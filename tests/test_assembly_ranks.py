@@ -25,7 +25,7 @@ def body(code: str, folder: Path) -> dict:
     mesh = (
         mesh_of("pendulum", code, (6, 1, 1), folder)
         if row.is_beam
-        else unit_cube(code, 3 if row.cell_name == "quad" else 2, folder, odd=True)
+        else unit_cube(code, 3 if row.is_plane else 2, folder, odd=True)
     )
     laws = [{"law": "svk", "young": 1.0, "poisson": 0.3, "density": 1.0}]
     data = {
@@ -41,7 +41,7 @@ def body(code: str, folder: Path) -> dict:
         data["constraint"][0]["move"] = {"z": 0.02}
     else:
         laws.append({"law": "neo_hooke", "young": 3.0, "poisson": 0.2, "density": 1.0, "group": "half"})
-    if row.cell_name == "quad":
+    if row.is_plane:
         data["section"] = SECTION
     return data
 

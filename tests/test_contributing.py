@@ -19,6 +19,7 @@ from mpi4py import MPI
 from pydantic import Field, create_model
 from tiny_meshes import quadratic_bricks
 
+import ancf_petsc
 from ancf_petsc import case_from_dict, cli, load_case, run
 from ancf_petsc.analysis.build import build
 from ancf_petsc.element import catalog
@@ -245,3 +246,16 @@ def test_a_verb_is_a_file_and_a_line(project, monkeypatch, capsys):
     assert cli.main(["volume", str(project / "meshes" / "bar_2x2x10.msh")]) == 0
     # The bar of 0.5 x 0.1 x 0.1 m; rounding of 240 volumes.
     assert float(capsys.readouterr().out) == pytest.approx(0.005, rel=1e-13)
+
+
+def test_a_study_is_a_file(project, tmp_path):
+    text = (project / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    study = text.split("## Add a study\n")[1].split("```toml\n")[1].split("```")[0]
+    assert study.count('case = "statics.toml"') == 1
+    base = (project / "cases/bar_tension/statics.toml").as_posix()
+    (tmp_path / "study_poisson.toml").write_text(study.replace("statics.toml", base))
+    outcome = ancf_petsc.study(tmp_path / "study_poisson.toml", tmp_path / "out", jobs=1)
+    # Without lateral strain the clamped face holds less: nu = 0.3 is stiffer, by less than its confined modulus, 1.35.
+    soft, stiff = outcome.table["end"]
+    assert soft < stiff < soft / 1.35
+    assert (tmp_path / "out/charts/values_end.png").is_file()

@@ -83,7 +83,7 @@ def program():
 
 def test_mass_is_that_of_the_derivation(program):
     row, tables, _ = program
-    half = np.stack([map_functions(m, tables.jacobians, row)[0] for m in mean_products(row)], axis=0)
+    half = np.stack([map_functions(m, tables.jacobians, row)[0] for m in mean_products(row)[0]], axis=0)
     mass = DENSITY * np.stack([map_functions(m, tables.jacobians, row)[0] for m in half.T], axis=1)
     wanted = DENSITY * np.einsum("g,ga,gb->ab", WEIGHTS, VALUES, VALUES)
     np.testing.assert_allclose(mass, wanted, rtol=0, atol=1e-12 * wanted.max())

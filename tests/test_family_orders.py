@@ -18,6 +18,8 @@ LADDERS = {
     "3413": (4, 8, 2),
     "3813": (3, 6, 2),
     "2412": (8, 16, 2),
+    "2312": (8, 16, 2),
+    "2-6-1-2": (4, 8, 4),
     "3-10-1-3": (2, 4, 4),
     "3443": (2, 4, 4),
     "3443+4": (2, 3, 6),
@@ -77,7 +79,9 @@ class Manufactured:
         self.weights, self.row, self.model = tables.fractions, row, model
         self.shape = np.stack([self._turn(g) for g in np.moveaxis(tables.gradients, 2, 0)], axis=-1)
         xi = row.rule("exact").points
-        linear = ELEMENTS[{"tetra": "3413", "hexahedron": "3813", "quad": "2412"}[row.cell_name]].values(xi)
+        linear = ELEMENTS[
+            {"tetra": "3413", "hexahedron": "3813", "quad": "2412", "triangle": "2312"}[row.cell_name]
+        ].values(xi)
         self.places = np.einsum("qc,eci->eqi", linear, corners)
 
     def _turn(self, values):

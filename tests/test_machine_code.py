@@ -151,10 +151,13 @@ def test_a_closure_over_anything_else_is_refused():
         scaled({})
 
 
-@pytest.mark.parametrize("code", ["3413", "3-10-1-3", "1222"])
-def test_the_check_of_info_finds_machine_code_of_another_law(code, monkeypatch, machine_code):
+@pytest.mark.parametrize(
+    ("code", "flags"),
+    [("3413", {}), ("3-10-1-3", {}), ("1222", {}), ("2-6-1-2", {"axisymmetric": True})],
+)
+def test_the_check_of_info_finds_machine_code_of_another_law(code, flags, monkeypatch, machine_code):
     laws = list(LAWS.values())
-    assert selfcheck.wrong_kernels(element(code), laws, mean=True, moving=True) == []
+    assert selfcheck.wrong_kernels(element(code), laws, mean=True, moving=True, **flags) == []
     if code == "3413":
         assert len(march.signatures) == 1  # compiled once, for all laws
     if element(code).is_beam:
@@ -168,7 +171,7 @@ def test_the_check_of_info_finds_machine_code_of_another_law(code, monkeypatch, 
             yield call._replace(kernel=Impostor(call.kernel, other.kernel)) if swapped else call
 
     monkeypatch.setattr(selfcheck, "law_calls", with_code_of_the_other_law)
-    wrong = selfcheck.wrong_kernels(element(code), laws)
+    wrong = selfcheck.wrong_kernels(element(code), laws, **flags)
     assert wrong[0].startswith("force_at[neo_hooke_stress]")
 
 

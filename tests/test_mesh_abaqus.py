@@ -301,7 +301,9 @@ def test_the_middle_of_a_beam_is_its_second_node(tmp_path):
 def test_axisymmetric_elements_are_said(tmp_path):
     text = "*NODE\n1, 0, 0\n2, 1, 0\n3, 1, 1\n4, 0, 1\n*ELEMENT, TYPE=CAX4RH\n1, 1, 2, 3, 4\n"
     mesh = read(tmp_path, text, ("quad",), element="2412")
-    assert mesh.notes == ["1 CAX4RH elements are axisymmetric in the deck: read as a plane body"]
+    assert mesh.notes == [
+        '1 CAX4RH elements are axisymmetric in the deck: [section] plane = "axisymmetric" computes them so'
+    ]
     assert mesh.points.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 
 

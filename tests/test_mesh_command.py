@@ -6,6 +6,8 @@ def test_a_mesh_is_made_and_described(ancf, tmp_path):
     assert "99 nodes, 240 tetra cells, volume 0.005" in said
     assert said.rstrip().endswith("wrote b.msh")
     assert "bottom_edges" in said
+    again = ancf("mesh", "bar", "--divisions", "1", "1", "5", "--out", "b.msh", cwd=tmp_path).stdout
+    assert again.rstrip().endswith("replaced b.msh")
     assert (tmp_path / "b.msh").read_text().startswith("$MeshFormat\n2.2 0 8\n")
 
 

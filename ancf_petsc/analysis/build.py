@@ -14,6 +14,7 @@ from ancf_petsc.element.catalog import element
 from ancf_petsc.input.load import Case
 from ancf_petsc.kernel.choice import kernel_set
 from ancf_petsc.model.body import Body
+from ancf_petsc.model.frames import Frames
 from ancf_petsc.model.load import Load
 from ancf_petsc.model.model import Model
 from ancf_petsc.parallel.exchange import agree, on_root
@@ -43,16 +44,20 @@ def build(case: Case, comm: MPI.Comm) -> Built:
     return build_from(case, plan, comm)
 
 
-def build_from(case: Case, plan: Plan | None, comm: MPI.Comm) -> Built:
-    """Distribute a plan, which the root rank holds. Collective."""
+def build_from(
+    case: Case, plan: Plan | None, comm: MPI.Comm, owners: Callable[[Plan], NDArray] | None = None
+) -> Built:
+    """Distribute a plan, which the root rank holds. owners: gives the rank of each node, where they are known. Collective."""
     root = FromRoot(comm, plan)
-    body = _make_body(case, root)
+    body = _make_body(case, root, owners)
     rows = _Rows(root, body)
+    frames = _frames(root, rows)
     model = Model(
         **vars(body),
         drive=rows(lambda plan: plan.supports.drive),
+        frames=frames,
         drives=root.value(lambda plan: plan.supports.drives),
-        loads=_loads(case, body, rows),
+        loads=_loads(case, body, rows, frames),
         groups={
             name: np.flatnonzero(inside) for name, inside in rows.owned(lambda plan: plan.members).items()
         },
@@ -66,11 +71,14 @@ def build_from(case: Case, plan: Plan | None, comm: MPI.Comm) -> Built:
     )
 
 
-def _make_body(case: Case, root: FromRoot[Plan]) -> Body:
+def _make_body(case: Case, root: FromRoot[Plan], owners: Callable[[Plan], NDArray] | None) -> Body:
     """Nodes and cells of this rank, its cells sorted by material, own ones first."""
     comm, spec, row = root.comm, case.spec, element(case.spec.mesh.element)
     nodes = distribute(
-        comm, root.slab(lambda plan: plan.space.cells), root.value(lambda plan: len(plan.space.nodes))
+        comm,
+        root.slab(lambda plan: plan.space.cells),
+        root.value(lambda plan: len(plan.space.nodes)),
+        None if owners is None else root.slab(owners),
     )
     first = root.rows(
         lambda plan: np.stack((plan.space.first[:-1], np.diff(plan.space.first)), axis=1), nodes.file_nodes
@@ -78,13 +86,16 @@ def _make_body(case: Case, root: FromRoot[Plan]) -> Body:
     numbering = with_vectors(nodes, first, row.node, row.slot)
     numbering, material, cell_numbers = _sort_cells(root, numbering)
     slots = root.rows(lambda plan: plan.space.slots(), numbering.file_nodes)
+    revolution = root.value(lambda plan: plan.revolution)
     origin = root.value(lambda plan: nearby_origin(plan.space.points, plan.mesh.size))
+    if revolution is not None:
+        origin[revolution.radial] = 0.0  # radii are positions
     reference = root.rows(lambda plan: plan.space.reference(), numbering.file_nodes)
     reference[slots == 0] -= origin
     axes, section = root.value(lambda plan: plan.space.axes), spec.section
     tables = agree(
         comm,
-        lambda: kernel_set(row).cells(
+        lambda: kernel_set(row, axisymmetric=revolution is not None).cells(
             row,
             numbering.cells,
             reference,
@@ -92,6 +103,7 @@ def _make_body(case: Case, root: FromRoot[Plan]) -> Body:
             quadrature=spec.mesh.rule,
             thickness=(section.thickness or section.area or 1.0) if section else 1.0,
             numbers=cell_numbers,
+            **({"revolution": revolution} if revolution else {}),
         ),
     )
     return Body(
@@ -106,6 +118,7 @@ def _make_body(case: Case, root: FromRoot[Plan]) -> Body:
         size=root.value(lambda plan: plan.mesh.size),
         cell_numbers=cell_numbers,
         lumped=spec.dynamics is not None and spec.dynamics.mass == "lumped",
+        revolution=revolution,
     )
 
 
@@ -138,14 +151,27 @@ class _Rows:
         return {name: np.ascontiguousarray(together[:, k]) for k, name in enumerate(names)}
 
 
-def _loads(case: Case, body: Body, rows: _Rows) -> list[Load]:
-    """This rank's share of all loads."""
+def _frames(root: FromRoot[Plan], rows: _Rows) -> Frames:
+    """Those of this rank's nodal vectors. Collective."""
+    axes = root.value(lambda plan: plan.supports.axes)
+    if not len(axes):
+        return Frames(np.empty(0, np.int64), axes)
+    frame = rows(lambda plan: plan.supports.frame)
+    vectors = np.flatnonzero(frame >= 0)
+    return Frames(vectors, axes[frame[vectors]])
+
+
+def _loads(case: Case, body: Body, rows: _Rows, frames: Frames) -> list[Load]:
+    """This rank's share of all loads, with components of unknowns."""
     entered = rows.owned(lambda plan: plan.loads)
     ramps = Ramps(case.spec, case.file)
-    return [
+    loads = [
         KINDS[spec.type].share(spec, body, entered.get(number), ramps.of_load(spec.ramp))
         for number, spec in enumerate(case.spec.load)
     ]
+    for load in loads:
+        frames.to_frames(load.pattern)
+    return loads
 
 
 def _where_not_zero(weights: NDArray) -> tuple[NDArray, NDArray]:

@@ -13,7 +13,7 @@ from typing import Any
 from ancf_petsc.analysis.build import Built
 from ancf_petsc.analysis.host.clock import Clock
 from ancf_petsc.analysis.provenance import Provenance
-from ancf_petsc.errors import AncfError, Interrupted, writing
+from ancf_petsc.errors import AncfError, Interrupted, Stopped, writing
 from ancf_petsc.input.load import Case
 from ancf_petsc.parallel.exchange import agree
 from ancf_petsc.results.folder import write_summary
@@ -56,6 +56,7 @@ class Ending:
         more: dict[str, Any] = {"note": case.spec.note, "steps": totals["steps"], **facts}
         if failure is not None:
             more["reason"] = str(failure)
+        more["end"] = end_of(failure, facts.get("end"))
 
         def write() -> None:
             if comm.rank or self.about is None or self.mark is None:
@@ -89,3 +90,15 @@ class Ending:
             if not broken:
                 raise
             log.warning("%s", error)
+
+
+def end_of(failure: AncfError | None, known: Mapping[str, Any] | None) -> dict[str, Any]:
+    """How the run ended, in a form that programs read: kind, message in one line, and what the solver knows of it."""
+    if failure is None:
+        kind, message = "reached", "the end was reached"
+    elif isinstance(failure, Interrupted):
+        kind, message = "interrupted", str(failure)
+    else:
+        kind, message = ("diverged" if isinstance(failure, Stopped) else "environment"), str(failure)
+    more = dict(failure.facts) if isinstance(failure, Stopped) else {}
+    return {"kind": kind, "message": message, **(known or {}), **more}

@@ -57,11 +57,17 @@ def identity(case: Case) -> Identity:
 
 def case_hash(case: Case) -> str:
     """Of all values that the case has, but not of where its mesh lies."""
+    return _digest(json.dumps(values_of(case), sort_keys=True, ensure_ascii=True).encode())
+
+
+def values_of(case: Case) -> dict[str, Any]:
+    """All values of a case that its numbers hang on, in one spelling; not where its mesh lies."""
     values = case.spec.model_dump(exclude_defaults=True, warnings=False)
     values["mesh"].pop("file", None)
+    values.get("output", {}).pop("checkpoint", None)
     options = {name: value for name, value in case.spec.petsc.items() if not is_general_option(name)}
     values["petsc"] = {name: _as_number(value) for name, value in options.items()}
-    return _digest(json.dumps(_canonical(values), sort_keys=True, ensure_ascii=True).encode())
+    return _canonical(values)
 
 
 def mesh_hash(file: Path) -> str:

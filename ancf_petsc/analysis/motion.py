@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -38,6 +39,7 @@ class MotionAnalysis:
         self.mass = Mass(self.assembly, lumped=spec.mass == "lumped")
         self.damping = damping_of(case, self.assembly, self.mass)
         self.times = motion_times(spec)
+        self._run: MotionRun | None = None
         self.equations = Equations(self.assembly, self.mass, self.damping.alpha, spec.duration, self.times)
         x, v = self.assembly.reference_vector(), self.assembly.vector()
         set_velocity(v, self.mass, case.spec.initial or InitialSpec())
@@ -80,9 +82,11 @@ class MotionAnalysis:
         )
         return f"{self.integrator.describe()}, {self.spec.mass} mass, {loss}"
 
-    def facts(self) -> dict[str, float]:
+    def facts(self) -> dict[str, Any]:
         """What the summary holds beside what it has of every run."""
-        facts = {"damping": self.equations.damping}
+        facts: dict[str, Any] = {"damping": self.equations.damping}
+        if self._run is not None:
+            facts |= {"end": self._run.end, **self._run.control.facts()}
         longest = self.integrator.longest_stable
         return facts if longest is None else {**facts, "longest_stable_step": longest}
 
@@ -90,7 +94,8 @@ class MotionAnalysis:
         self, record: Record, clock: Clock, watch: Callable[[float], None], stop: Callable[[], bool]
     ) -> MotionRun:
         """The run, ready to go."""
-        return MotionRun(self.integrator, self.times, record, clock, watch, stop)
+        self._run = MotionRun(self.integrator, self.times, record, clock, watch, stop)
+        return self._run
 
     def destroy(self) -> None:
         """Free PETSc's objects."""
@@ -104,4 +109,4 @@ def set_velocity(v: PETSc.Vec, mass: Mass, spec: InitialSpec) -> None:
     arm, uniform = model.reference[: model.owned].copy(), np.zeros((model.owned, 3))
     arm[model.own_positions] -= centre - model.origin
     uniform[model.own_positions] = spec.velocity
-    v.array[:] = (uniform + np.cross(spec.spin, arm)).ravel()
+    v.array[:] = model.frames.to_frames(uniform + np.cross(spec.spin, arm)).ravel()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ from ancf_petsc.model.motion_work import MotionWork, Powers
 from ancf_petsc.motion.integration import TimeIntegration
 from ancf_petsc.motion.integrators import Integrator, Step
 from ancf_petsc.parallel.exchange import combined
+from ancf_petsc.solve.step_control import StepControl
+from ancf_petsc.solve.weakest import weakest_cell
 
 MOTION_COUNTS = (*COUNTS, "rejected_steps")
 log = logging.getLogger(STEPS)
@@ -44,6 +47,8 @@ class MotionRun:
         self.duration = self.equations.duration
         self.times = set(times)
         self.totals = dict.fromkeys(MOTION_COUNTS, 0)
+        self.control = StepControl("time")
+        self.end: dict[str, Any] = {}
         self._since = dict.fromkeys(MOTION_COUNTS, 0)
         model = self.assembly.model
         self.work = MotionWork(model.drives, model.loads, self.duration)
@@ -52,13 +57,51 @@ class MotionRun:
         self._kinetic = 0.0
         self._start_energy = 0.0
         self._begun = time.perf_counter()
+        self._from: float | None = None  # time of the state that the run goes on from
         self.path = TimeIntegration(integrator, times, self._on_step, self._on_corner, stop)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether `state` says all."""
+        return self.integrator.is_ready
+
+    @property
+    def place(self) -> str:
+        """Where it is, in words."""
+        return f"time {self.integrator.time:.6g}"
+
+    def state(self) -> dict[str, Any]:
+        """All that the rest of the run hangs on, between two steps. Collective."""
+        return {
+            "totals": self.totals,
+            "since": self._since,
+            "row": self.record.row,
+            "written": self._written,
+            "work": self.work.state(),
+            "work_is_due": self._work_is_due,
+            "kinetic": self._kinetic,
+            "start_energy": self._start_energy,
+            "control": self.control.state(),
+            "integrator": self.integrator.state(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Let `go` go on from a state. Collective."""
+        self.totals, self._since = dict(state["totals"]), dict(state["since"])
+        self.record.row, self._written = dict(state["row"]), state["written"]
+        self.work.restore(state["work"])
+        self._work_is_due, self._kinetic = state["work_is_due"], state["kinetic"]
+        self._start_energy = state["start_energy"]
+        self.control.restore(state["control"])
+        self.integrator.restore(state["integrator"])
+        self._from = self.integrator.time
 
     def go(self) -> None:
         """To the end. Raises MotionStopped or Interrupted, with the last good state saved."""
-        self.work.start(0.0, self._powers())
-        self._start_energy = self.assembly.strain_energy(self.integrator.x) + self._kinetic_energy()
-        self._write()
+        if self._from is None:
+            self.work.start(0.0, self._powers())
+            self._start_energy = self.assembly.strain_energy(self.integrator.x) + self._kinetic_energy()
+            self._write()
         try:
             self.path.run()
         except (MotionStopped, Interrupted):
@@ -68,6 +111,10 @@ class MotionRun:
                 self._write()
             raise
         finally:
+            self.end = {
+                "time": self.integrator.time,
+                **weakest_cell(self.assembly, self.integrator.x).facts(),
+            }
             self.path.destroy()
 
     # --- steps
@@ -78,6 +125,10 @@ class MotionRun:
         ):
             self.totals[name] += count
             self._since[name] += count
+        if step.rejected:
+            self.control.note(
+                "rejected", "its error is above the tolerance", step.time, step.size, count=step.rejected
+            )
         log.debug(
             "    t %.9g: steps %d, newton %d, linear %d, rejected %d",
             step.time, step.count, step.newton, step.linear, step.rejected,
@@ -134,7 +185,9 @@ class MotionRun:
             x, v, now = self.integrator.x, self._velocity(), self.integrator.time
             balance = self.equations.out_of_balance(now, x, v, self._acceleration())
             more = {**self._energies(), **self._momenta(), **self._since}
-            row = self.record.write({"time": now}, x, balance, more, {"velocity": v})
+            row = self.record.write(
+                {"time": now}, x, balance, more, {"velocity": self.assembly.along_axes(v)}
+            )
             self._log_output(row)
         self._since = dict.fromkeys(MOTION_COUNTS, 0)
         self._written = now
@@ -153,8 +206,9 @@ class MotionRun:
     def _potential_energy(self) -> float:
         """- sum m g . r with gravity as it is now."""
         model = self.assembly.model
-        positions = self.integrator.x.array_r.reshape(-1, 3).copy()
-        positions[model.own_positions] += model.origin
+        shift = np.zeros((model.owned, 3))
+        shift[model.own_positions] = model.origin
+        positions = self.integrator.x.array_r.reshape(-1, 3) + model.frames.to_frames(shift)
         s = self.integrator.time / self.duration
         own = sum(
             -load.ramp.value(s) * float(np.vdot(load.pattern, positions))
@@ -170,7 +224,7 @@ class MotionRun:
 
     def _log_output(self, row: dict[str, float]) -> None:
         now, spent = self.integrator.time, time.perf_counter() - self._begun
-        rate = now / spent if spent else 0.0
+        rate = (now - (self._from or 0.0)) / spent if spent else 0.0
         left = (self.duration - now) / rate if rate else 0.0
         log.info(
             "t %-10.6g energies: kinetic %10.4g  strain %10.4g  drift %9.2g  steps %5d  newton %5d  "

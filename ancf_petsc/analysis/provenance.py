@@ -8,7 +8,8 @@ import os
 import shlex
 import socket
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -20,6 +21,7 @@ from ancf_petsc.errors import CaseError
 from ancf_petsc.input.load import Case, case_from_text
 from ancf_petsc.log import RECORD
 from ancf_petsc.plan.case_mesh import mesh_file
+from ancf_petsc.results.checkpoint_file import all_in
 from ancf_petsc.results.tables import file_text
 
 log = logging.getLogger(RECORD)
@@ -113,15 +115,26 @@ def case_of_run(folder: str | Path, overrides: Sequence[str] = (), petsc_options
     return case
 
 
+def recorded_case(folder: Path, summary: Mapping[str, Any] | None = None) -> Case:
+    """The effective case of the run in a folder, or of a summary, whatever became of its mesh. Raises CaseError."""
+    said = _recorded(folder) if summary is None else _of_summary(summary)
+    return case_from_text(said["text"], Path(said["file"] or folder), Path(said["folder"]), said["name"])
+
+
+def _of_summary(said: Mapping[str, Any]) -> dict[str, str]:
+    case, mesh = said["case"], said["mesh"]
+    found = {**case, "mesh_file": mesh["file"], "mesh_sha256": mesh["sha256"]}
+    return {name: str(found[name]) for name in RECORDED}
+
+
 def _recorded(folder: Path) -> dict[str, str]:
-    """text, file, folder, name, mesh_file, mesh_sha256 of a run: from its summary, or from its results if it was cut short."""
-    try:
-        said = json.loads(file_text(folder / "summary.json"))
-        case, mesh = said["case"], said["mesh"]
-        found = {**case, "mesh_file": mesh["file"], "mesh_sha256": mesh["sha256"]}
-        return {name: str(found[name]) for name in RECORDED}
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        pass
+    """text, file, folder, name, mesh_file, mesh_sha256 of a run: from its summary, or from a checkpoint or its results if it
+    was cut short.
+    """
+    with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
+        return _of_summary(json.loads(file_text(folder / "summary.json")))
+    with suppress(OSError, KeyError, IndexError):
+        return _of_summary(all_in(folder)[0][0].about["run"])
     from ancf_petsc.results.reader import open_results
 
     facts = open_results(folder).facts
@@ -134,4 +147,4 @@ def _recorded(folder: Path) -> dict[str, str]:
             key="--again",
             cure="it is of an earlier version: run the case file",
         )
-    return {name: str(value) for name, value in found.items()}
+    return {name: str(found[name]) for name in RECORDED}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -21,6 +22,7 @@ from ancf_petsc.model.measures import mean_position, mean_stress, reaction, von_
 from ancf_petsc.parallel.exchange import ToSlabs, combined, on_root
 from ancf_petsc.plan.curve import STROKE
 from ancf_petsc.plan.probes import name_of
+from ancf_petsc.results.rollback import GoesOn, position_of
 from ancf_petsc.results.store import ResultStore
 from ancf_petsc.results.tables import CsvTable
 
@@ -39,8 +41,10 @@ class Record:
         assembly: Assembly,
         version: str,
         facts: Mapping[str, str] | None = None,
+        goes_on: GoesOn | None = None,
     ) -> None:
-        """facts: attributes of results.h5, on the root rank."""
+        """facts: attributes of results.h5, on the root rank. goes_on: with files that stand at a checkpoint."""
+        self._goes_on = goes_on is not None
         self.folder = folder
         self.spec = spec
         self.built = built
@@ -53,7 +57,14 @@ class Record:
         own = np.flatnonzero(numbering.own_cells)
         self._cells = ToSlabs(self.comm, numbering.file_cells[own], order.total_cells, of=own)
         self._store = ResultStore(
-            folder, self.comm, spec.title, spec.units, note=spec.note, version=version, facts=facts
+            folder,
+            self.comm,
+            spec.title,
+            spec.units,
+            note=spec.note,
+            version=version,
+            facts=facts,
+            goes_on=goes_on,
         )
         self._store.write_mesh(
             order.points, order.kind, order.cells, order.node_numbers, order.cell_numbers, order.groups
@@ -64,6 +75,11 @@ class Record:
         for table in self._tables.values():
             table.close()
         self._store.close()
+
+    def position(self) -> dict[str, Any]:
+        """On the root rank what takes the files back to where they stand now; empty on the others. Collective."""
+        found = on_root(self.comm, lambda: position_of(self.folder, self._store.numbers))
+        return {"steps": self._store.steps, **found} if found else {}
 
     def write(
         self,
@@ -86,7 +102,7 @@ class Record:
         rows = {"curve.csv": row}
         if self.spec.probe:
             rows["probes.csv"] = {**time, **self._probes(x)}
-        positions, model = x.array_r.reshape(-1, 3), self.assembly.model
+        positions, model = self.assembly.along_axes(x.array_r.reshape(-1, 3)), self.assembly.model
         nodes = {"displacement": positions - model.reference[: model.owned], **(node_fields or {})}
         points = {name: self._points(rows) for name, rows in nodes.items()}
         if model.element.has_slopes:
@@ -154,7 +170,7 @@ class Record:
             path = self.folder / file
             with writing(path):
                 if file not in self._tables:
-                    self._tables[file] = CsvTable(path, list(row))
+                    self._tables[file] = CsvTable(path, list(row), goes_on=self._goes_on)
                 self._tables[file].append(row)
 
 

@@ -37,7 +37,15 @@ class StaticAnalysis:
     def facts(self) -> dict[str, Any]:
         """What the summary holds beside what it has of every run."""
         run = self._run
-        return {"critical_points": run.events, "doubts": run.doubts} if run else {}
+        if run is None:
+            return {}
+        return {
+            "critical_points": run.events,
+            "jumps": run.jumps,
+            "doubts": run.doubts,
+            "end": run.end,
+            **run.control.facts(),
+        }
 
     def begin(
         self, record: Record, clock: Clock, watch: Callable[[float], None], stop: Callable[[], bool]

@@ -32,7 +32,6 @@ from ancf_petsc.bench.messages import exchange_cost, messages
 from ancf_petsc.bench.problems import PROBLEMS, block, block_force_234, reference_tip
 from ancf_petsc.bench.solvers import iterations
 from ancf_petsc.bench.yardstick import copy_rate, gather_time
-from ancf_petsc.errors import NoEquilibrium
 from ancf_petsc.input.load import Case, case_from_dict
 from ancf_petsc.parallel.exchange import on_root
 from ancf_petsc.plan.case_mesh import mesh_of
@@ -125,21 +124,6 @@ def set_up(comm: MPI.Comm, *, problem: dict[str, Any], repetitions: int) -> Resu
     return {"samples": samples, "error": abs(volume / (0.05**2 * 0.1) - 1), "facts": {"seconds": seconds}}
 
 
-def stroke(comm: MPI.Comm, *, problem: dict[str, Any], repetitions: int) -> Result:
-    """How far the body can be pressed: the last stroke with an equilibrium, and why it is the last."""
-    case = _case(comm, problem)
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(comm.bcast(place)) / "run"
-        begun, why = time.perf_counter(), ""
-        try:
-            run_case(case, folder, comm=comm)
-        except NoEquilibrium as end:
-            why = str(end)
-        found = comm.bcast(on_root(comm, lambda: _last_row(folder)))
-        facts = {**found, "why": why, "seconds": time.perf_counter() - begun, "ended": bool(why)}
-    return {"samples": [abs(found["stroke"])], "error": None, "facts": facts}
-
-
 class _Splits:
     """A stopwatch for the parts of collective work."""
 
@@ -203,11 +187,6 @@ def _error(result: Result, known: dict[str, Any]) -> float | None:
     return None
 
 
-def _last_row(folder: Path) -> dict[str, float]:
-    results = open_results(folder)
-    return {name: float(results.curve[name][-1]) for name in ("stroke", "force", "min_det_F")}
-
-
 def _resident() -> int:
     """Bytes of memory this process holds."""
     return _status("VmRSS")
@@ -240,7 +219,6 @@ MEASUREMENTS: dict[str, Callable[..., Result]] = {
     "run": run,
     "either_solver": either_solver,
     "explicit": explicit,
-    "stroke": stroke,
     "iterations": iterations,
     "mass_solver": mass_solver,
     "reader": reader,

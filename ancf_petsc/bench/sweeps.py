@@ -1,84 +1,11 @@
-"""The benchmarks without a target: the charts, iterations and the model of scaling in docs/performance.md."""
+"""The benchmarks without a target: iterations, alternatives and the model of scaling in docs/performance.md."""
 
 from __future__ import annotations
-
-from typing import Any
 
 from ancf_petsc.bench.alternatives import LINEAR_SOLVERS, MASS_SOLVERS
 from ancf_petsc.bench.row import BLOCK_74K, BLOCK_480K, CUBE_74K, FORCE_74K, FORCE_480K, SOLUTION, Row, press
 from ancf_petsc.bench.table import PENDULUM
 from ancf_petsc.element.catalog import ELEMENTS
-
-STROKES = {"pvc_block": 0.025, "cube": 0.015}
-ACCURACY = {
-    "pvc_block": {
-        "3413": [f"pvc_block:{size}" for size in ("0.02", "0.014", "0.01", "0.007", "0.005", "0.0035")],
-        "3-10-1-3": [f"pvc_block:{size}:quadratic" for size in ("0.03", "0.02", "0.014", "0.01")],
-    },
-    "cube": {
-        "3413": [f"cube:{size}" for size in ("0.01", "0.007", "0.005", "0.0035", "0.0025")],
-        "3-10-1-3": [f"cube:{size}:quadratic" for size in ("0.02", "0.0125", "0.008", "0.005")],
-        "3813": [f"cube:{bricks}:hexahedra" for bricks in ("3x3x6", "6x6x12", "9x9x18", "18x18x36")],
-        "3843": [f"cube:{bricks}:hexahedra" for bricks in ("1x1x2", "2x2x4", "3x3x6", "4x4x8")],
-    },
-}
-
-
-def _accuracy() -> list[Row]:
-    """Force over mesh sizes and elements, both laws; bricks have to be parallelepipeds: the cube alone.
-
-    The cube is pressed by 15 mm, before svk fails on fine meshes.
-    """
-    return [
-        Row(
-            f"accuracy/{law}/{body}/{element}/{mesh}",
-            f"force of the {body} at {1e3 * STROKES[body]:.0f} mm",
-            "run",
-            _accurate(mesh, STROKES[body], law, element),
-            repetitions=2,
-        )
-        for law in ("svk", "neo_hooke")
-        for body, elements in ACCURACY.items()
-        for element, names in elements.items()
-        for mesh in names
-    ]
-
-
-def _accurate(mesh: str, stroke: float, law: str, element: str) -> dict[str, Any]:
-    """The task of one run, warmed up by its own element and law."""
-    problem = {"name": "block", "mesh": mesh, "law": law, "element": element, "smallest_step": 1e-3}
-    problem |= {"stroke": stroke, "steps": 5}
-    return {"problem": problem, "warm_up": problem | {"stroke": 1e-5, "steps": 1}}
-
-
-def _strokes() -> list[Row]:
-    """How far each law lets the cube and the PVC block be pressed, against mesh size."""
-    meshes = {
-        "cube": ("0.02", "0.0125", "0.008", "0.005", "0.0035", "0.0025"),
-        "pvc_block": ("0.02", "0.014", "0.01", "0.007", "0.005"),
-    }
-    return [
-        Row(
-            f"stroke/{law}/{body}:{size}",
-            "stroke at which no equilibrium is found further on",
-            "stroke",
-            {
-                "problem": {
-                    "name": "block",
-                    "mesh": f"{body}:{size}",
-                    "stroke": 0.08,
-                    "steps": 80,
-                    "law": law,
-                    "smallest_step": 1e-5,
-                }
-            },
-            unit="m",
-            repetitions=1,
-        )
-        for law in ("svk", "neo_hooke")
-        for body, sizes in meshes.items()
-        for size in sizes
-    ]
 
 
 def _scaling() -> list[Row]:
@@ -281,8 +208,6 @@ def _line_searches() -> list[Row]:
 
 SWEEPS = [
     *_points(),
-    *_accuracy(),
-    *_strokes(),
     *_iterations(),
     *_line_searches(),
     *_scaling(),

@@ -28,9 +28,13 @@ VERBS = {
     "check": ("ancf_petsc.cli.check", "check a case and its mesh, solve nothing"),
     "plot": ("ancf_petsc.cli.plot", "draw the curves of runs"),
     "view": ("ancf_petsc.cli.view", "look at a run, or at a case before it runs"),
+    "study": ("ancf_petsc.cli.study", "run a case with keys varied, tabulate errors and costs"),
+    "advise": ("ancf_petsc.cli.advise", "find the cheapest element, mesh and step within an error"),
     "info": ("ancf_petsc.cli.info", "versions, elements, self-check"),
     "modes": ("ancf_petsc.cli.modes", "natural frequencies and shapes of a case's body"),
     "mesh": ("ancf_petsc.cli.mesh", "make one of the project's meshes at a size"),
+    "export": ("ancf_petsc.cli.export", "write a case as the input of another program, CalculiX"),
+    "reduce": ("ancf_petsc.cli.reduce", "write a smaller case that gives the same answer"),
     "new": ("ancf_petsc.cli.new", "write a commented case to start from"),
     "bench": ("ancf_petsc.cli.bench", "time configurations with known answers"),
 }
@@ -57,12 +61,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as leave:
         return leave.code if isinstance(leave.code, int) else int(leave.code is not None)
     except AncfError as error:
+        _end_others_unless_they_know(error)
         return _print_error(error)
-    except ModuleNotFoundError as error:
-        if (error.name or "").startswith("ancf_petsc"):
+    except ImportError as error:
+        from ancf_petsc.cli.packages import import_problem
+
+        if (problem := import_problem(error, words[0])) is None:
             raise
-        cure = "run scripts/setup, or use environment.yml"
-        return _print_error(EnvironmentProblem(f"the Python package {error.name} is missing; {cure}"))
+        return _print_error(problem)
     except KeyboardInterrupt:
         _abort_others(Interrupted.exit_code)
         return _print_error(Interrupted("interrupted"))
@@ -80,6 +86,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if rank_count() == 1:
             raise
         sys.excepthook(*sys.exc_info())
+        print(f"error: rank {rank()}: {sys.exc_info()[1]!r}", file=sys.stderr, flush=True)
         _abort_others(1)
         return 1
     return code
@@ -213,6 +220,18 @@ def _print_error(error: AncfError) -> int:
 def _mpi() -> Any:
     """mpi4py.MPI if this process has started MPI."""
     return sys.modules.get("mpi4py.MPI")
+
+
+def _end_others_unless_they_know(error: AncfError) -> None:
+    """Errors of this program are raised on all ranks. One that is raised on this rank alone leaves the others waiting for it."""
+    mpi = _mpi()
+    if rank_count() == 1 or mpi is None:
+        return
+    from ancf_petsc.parallel.exchange import all_meet
+
+    if not all_meet(mpi.COMM_WORLD):
+        print(f"error: rank {rank()}, alone: {error}", file=sys.stderr, flush=True)
+        _abort_others(error.exit_code)
 
 
 def _abort_others(code: int) -> None:

@@ -84,8 +84,8 @@ def _check_machine_code() -> bool:
     from ancf_petsc.kernel.warmup import clear_cache, compiled_sets
 
     wrong, names, begun = set[str](), set[str](), time.perf_counter()
-    for element, laws, mean, moving in compiled_sets():
-        wrong.update(wrong_kernels(element, laws, mean=mean, moving=moving))
+    for element, laws, flags in compiled_sets():
+        wrong.update(wrong_kernels(element, laws, **flags))
         names.update(law.name for law in laws)
     if wrong:
         clear_cache()

@@ -27,9 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--hexahedra", action="store_true", help="leave the bricks whole")
     parser.add_argument(
         "--flat",
-        choices=("quad", "line"),
+        choices=("triangle", "quad", "line"),
         default="",
-        help="quad: the section half way along y; line: the axis along x",
+        help="triangle, quad: the section half way along y, of a ring in x-z; line: the axis along x",
     )
     parser.add_argument(
         "--order", type=int, default=1, metavar="1|2", help="2: quadratic tetrahedra (default 1)"
@@ -53,9 +53,11 @@ def execute(arguments: argparse.Namespace) -> int:
         raise CaseError(
             "missing", key="NAME", expected=f"one of {', '.join(BODIES)}", cure="ancf mesh --list"
         )
-    path = make_mesh(
+    path = arguments.out or Path(f"{arguments.name}.msh")
+    replaced = path.is_file()
+    make_mesh(
         arguments.name,
-        arguments.out or Path(f"{arguments.name}.msh"),
+        path,
         size=arguments.size,
         rim=arguments.rim,
         divisions=arguments.divisions,
@@ -65,6 +67,7 @@ def execute(arguments: argparse.Namespace) -> int:
         version=arguments.format,
     )
     _print_mesh(path, (arguments.flat,) if arguments.flat else ("tetra", "tetra10", "hexahedron"))
+    print(f"{'replaced' if replaced else 'wrote'} {path}")
     return 0
 
 
@@ -102,4 +105,3 @@ def _print_mesh(path: Path, kinds: tuple[str, ...]) -> None:
         sizes = [f"{group.measures[d]:.6g}" if d in group.measures else "" for d in dimensions]
         table.add_row(name, str(group.nodes), *counts, *sizes)
     console.print(table)
-    console.print(f"wrote {path}", soft_wrap=True)

@@ -7,6 +7,7 @@ import shlex
 import time
 from pathlib import Path
 
+from ancf_petsc.errors import CaseError
 from ancf_petsc.launcher import quick_if_alone
 
 HELP = "solve a case; under mpiexec -n N on N ranks"
@@ -42,6 +43,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="CASE is the folder of a run: repeat it, with all its changes, in its folder or in --out",
     )
+    parser.add_argument(
+        "--restart",
+        action="store_true",
+        help="go on from the last checkpoint in the folder of the results, or start where there is none; "
+        "CASE may be the folder of a run",
+    )
+    parser.add_argument(
+        "--extend",
+        action="store_true",
+        help="with --restart: though the case now asks for a longer duration, more outputs or other options of PETSc",
+    )
     volume = parser.add_mutually_exclusive_group()
     volume.add_argument(
         "--quiet", action="store_const", dest="verbosity", const=-1, default=0, help="warnings only"
@@ -66,6 +78,28 @@ def results_line(folder: Path) -> str:
     return f"results in {folder}; ancf plot {name} draws the curves, ancf view {name} shows the body"
 
 
+def is_run(path: Path) -> bool:
+    """Whether a path is the folder of a run, and no case."""
+    from ancf_petsc.input.load import CASE_FILE
+    from ancf_petsc.results.checkpoint_file import NAMES
+
+    left = ("summary.json", "results.h5", *NAMES)
+    return not (path / CASE_FILE).is_file() and any((path / name).is_file() for name in left)
+
+
+def refuse_together(arguments: argparse.Namespace) -> None:
+    """Raise CaseError for options that contradict each other."""
+    problem = ""
+    if arguments.extend and not arguments.restart:
+        problem = "--extend without --restart"
+    elif arguments.restart and (arguments.again or arguments.force):
+        problem = f"--restart with {'--again' if arguments.again else '--force'}"
+    if problem:
+        raise CaseError(
+            problem, file="ancf run", expected="--restart alone, or with --extend", cure="see ancf run --help"
+        )
+
+
 def execute(arguments: argparse.Namespace) -> int:
     begun = time.perf_counter()
     with quick_if_alone():
@@ -78,17 +112,28 @@ def execute(arguments: argparse.Namespace) -> int:
     from ancf_petsc.parallel.exchange import on_root
 
     comm = MPI.COMM_WORLD
+    refuse_together(arguments)
     log.configure(rank=comm.rank, verbosity=arguments.verbosity)
-    load = case_of_run if arguments.again else load_case
+    of_run = arguments.again or (arguments.restart and is_run(arguments.case))
+    load = case_of_run if of_run else load_case
     read = on_root(comm, lambda: load(arguments.case, changes(arguments), arguments.petsc_options))
     case = comm.bcast(read)
     start_petsc(case.spec.petsc)
     from ancf_petsc.analysis.run import run_case
 
-    out = arguments.out or (arguments.case if arguments.again else None)
+    out = arguments.out or (arguments.case if of_run else None)
     imports = time.perf_counter() - begun
     with log.progress(1.0, "of the path" if case.spec.statics else "of the motion") as bar:
-        folder = run_case(case, out, comm=comm, force=arguments.force, imports=imports, watch=bar.advance_to)
+        folder = run_case(
+            case,
+            out,
+            comm=comm,
+            force=arguments.force,
+            restart=arguments.restart,
+            extend=arguments.extend,
+            imports=imports,
+            watch=bar.advance_to,
+        )
     if comm.rank == 0 and arguments.verbosity >= 0:
         print(results_line(folder))
     return 0

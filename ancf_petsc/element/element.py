@@ -42,9 +42,9 @@ class Element:
     first. corner, edge, face: nodal vectors on each corner, middle of an edge, centre of a face. monomials:
     as `shape.monomials` reads them. condensed: the monomials hold one more value for each face centre, which
     follows from the face's corners. complete: the degree up to which every polynomial is reproduced. points:
-    number of quadrature points by name: default; exact (the energy of svk); mass (exact); reduced where it is
-    safe (no energy-free motion but the rigid ones). continuity: derivatives that are continuous between
-    elements.
+    number of quadrature points by name: default; exact (the energy of svk); mass (exact, of bodies of revolution
+    too); reduced where it is safe (no energy-free motion but the rigid ones); ring where bodies of revolution need
+    more than default. continuity: derivatives that are continuous between elements.
     """
 
     code: str
@@ -97,6 +97,11 @@ class Element:
     def is_beam(self) -> bool:
         """Whether its strains are those of an axis, stretched and bent."""
         return self.cell.dimension < min(self.components, 2)
+
+    @property
+    def is_plane(self) -> bool:
+        """Whether its cells lie in a plane and its points move in it."""
+        return self.cell.dimension == self.components == 2
 
     @property
     def is_curved(self) -> bool:

@@ -10,7 +10,8 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from ancf_petsc.element import dncm
 from ancf_petsc.errors import CaseError
-from ancf_petsc.input.schema import CaseSpec, ConstraintSpec, laws
+from ancf_petsc.input.schema import CaseSpec, ConstraintSpec
+from ancf_petsc.input.section import section
 from ancf_petsc.input.types import Direction, Ramp, problem
 
 Problems = Iterator[PydanticCustomError]
@@ -31,7 +32,7 @@ def check(spec: CaseSpec) -> None:
 def problems(spec: CaseSpec) -> list[PydanticCustomError]:
     """All that is wrong between the tables, the most basic first."""
     checks = (
-        *(_one_analysis, _materials, _densities, _unions, _probes, _motion, _strokes, _arc_length, _section),
+        *(_one_analysis, _materials, _densities, _unions, _probes, _motion, _strokes, _arc_length, section),
         *(_held_slopes, _ramps, _options),
     )
     return [found for check in checks for found in check(spec)]
@@ -233,50 +234,6 @@ def _arc_length(spec: CaseSpec) -> Problems:
             expected='a load or move whose ramp is "linear"',
             cure='give one, or write control = "load"',
         )
-
-
-def _section(spec: CaseSpec) -> Problems:
-    """Solids have no section; plane elements need thickness and plane state, beams area and inertia."""
-    code = spec.mesh.element
-    needed = {"1": ("area", "inertia"), "2": ("thickness", "plane")}.get(code[0], ())
-    section = spec.section
-    given = (
-        [name for name in type(section).model_fields if getattr(section, name) is not None] if section else []
-    )
-    for name in given:
-        if name not in needed:
-            yield problem(
-                f"element {code} does not read it",
-                at=["section", name],
-                got=getattr(section, name),
-                expected=f"{' and '.join(needed) or 'no [section]'} for element {code}",
-                cure="drop it",
-            )
-    condensing = " or ".join(name for name, law in laws().items() if law.condenses)
-    others = [material.law for material in spec.material if not laws()[material.law].condenses]
-    if "plane" in needed and section and section.plane == "stress" and others:
-        yield problem(
-            at=["section", "plane"],
-            got="stress",
-            expected=f"plane strain for {others[0]}",
-            cure=f"use {condensing} or plane strain",
-        )
-    if "area" in needed and others:
-        yield problem(
-            "beams are linearly elastic",
-            at=["material", 0, "law"],
-            got=others[0],
-            expected=f"{condensing} for beams",
-            cure=f'law = "{condensing}": young is all a beam reads of it',
-        )
-    for name in needed:
-        if name not in given:
-            yield problem(
-                "missing",
-                at=["section", name],
-                expected=f"{' and '.join(needed)} for element {code}",
-                cure="add it to [section]",
-            )
 
 
 def _held_slopes(spec: CaseSpec) -> Problems:

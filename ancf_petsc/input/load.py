@@ -100,8 +100,8 @@ def case_from_dict(data: Mapping[str, Any], folder: str | Path, name: str = "cas
 def _checked(
     data: dict[str, Any], file: Path | None, folder: Path, name: str, label: str | Path | None = None
 ) -> Case:
-    _refuse_nul(data, label or file or name)
-    source = _tuples(data)
+    refuse_nul(data, label or file or name)
+    source = as_tuples(data)
     frozen = dict(source)
     if isinstance(source.get("material"), dict):
         frozen["material"] = (source["material"],)
@@ -113,24 +113,24 @@ def _checked(
     return Case(spec, file, folder, name, toml.write(data))
 
 
-def _tuples(value: Any) -> Any:
+def as_tuples(value: Any) -> Any:
     """Lists as tuples, arrays as numbers: what is checked cannot change any more."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, Mapping):
-        return {name: _tuples(inner) for name, inner in value.items()}
-    return tuple(map(_tuples, value)) if isinstance(value, list | tuple) else value
+        return {name: as_tuples(inner) for name, inner in value.items()}
+    return tuple(map(as_tuples, value)) if isinstance(value, list | tuple) else value
 
 
-def _refuse_nul(value: Any, file: str | Path, path: tuple[str, ...] = ()) -> None:
+def refuse_nul(value: Any, file: str | Path, path: tuple[str, ...] = ()) -> None:
     """Raise CaseError for a text with a NUL character, which neither file names nor result files can hold."""
     if isinstance(value, Mapping):
         for name, inner in value.items():
-            _refuse_nul(str(name), file, (*path, str(name)))
-            _refuse_nul(inner, file, (*path, str(name)))
+            refuse_nul(str(name), file, (*path, str(name)))
+            refuse_nul(inner, file, (*path, str(name)))
     elif isinstance(value, list | tuple):
         for index, inner in enumerate(value):
-            _refuse_nul(inner, file, (*path, str(index)))
+            refuse_nul(inner, file, (*path, str(index)))
     elif isinstance(value, str) and "\0" in value:
         raise CaseError(
             "a NUL character", file=file, key=".".join(path), got=value, expected="text", cure="remove it"

@@ -35,18 +35,24 @@ class Place(NamedTuple):
 
 
 def case_error(
-    error: ValidationError, data: dict[str, Any], source: dict[str, Any], file: str | Path | None
+    error: ValidationError,
+    data: dict[str, Any],
+    source: dict[str, Any],
+    file: str | Path | None,
+    root: type[BaseModel] = CaseSpec,
+    page: str = FORMAT_PAGE,
 ) -> CaseError:
     """The first problem of `error` as a CaseError; misspelt keys first: they explain what is missing.
 
     data: the case as pydantic saw it, lists as tuples; source: the same, a lone [material] not in an array.
+    root: the table that was checked. page: the cure where nothing nearer is known.
     """
     found: dict[str, CaseError] = {}
     hidden = 0
     for detail in sorted(
         error.errors(include_url=False), key=lambda detail: detail["type"] != "extra_forbidden"
     ):
-        problem = _translate(detail, data, source, file)
+        problem = _translate(detail, data, source, file, root, page)
         found.setdefault(str(problem.key), problem)
         hidden += detail.get("ctx", {}).get("more", 0)
     first, others = next(iter(found.values())), len(found) - 1 + hidden
@@ -63,10 +69,15 @@ def case_error(
 
 
 def _translate(
-    detail: Mapping[str, Any], data: dict[str, Any], source: dict[str, Any], file: str | Path | None
+    detail: Mapping[str, Any],
+    data: dict[str, Any],
+    source: dict[str, Any],
+    file: str | Path | None,
+    root: type[BaseModel],
+    page: str,
 ) -> CaseError:
     kind, context = detail["type"], detail.get("ctx", {})
-    place = _below(_place(detail["loc"], data), context.get("at", ()))
+    place = _below(_place(detail["loc"], data, root), context.get("at", ()))
     path, got = place.path, place.value
     what, (expected, _, cure) = "", ((place.field and place.field.description) or "").partition("; ")
     if kind == "problem":
@@ -86,23 +97,23 @@ def _translate(
     if got is ABSENT:
         what, got = what or "missing", None
     key = written(path, source)
-    return CaseError(what, file=file, key=key, got=shown(got), expected=expected, cure=cure or FORMAT_PAGE)
+    return CaseError(what, file=file, key=key, got=shown(got), expected=expected, cure=cure or page)
 
 
 def _nearest(got: Any, known: tuple[str, ...]) -> str:
     return did_you_mean(got, known) if isinstance(got, str) else f"there are: {', '.join(known)}"
 
 
-def _place(loc: Sequence[str | int], data: dict[str, Any]) -> Place:
+def _place(loc: Sequence[str | int], data: dict[str, Any], root: type[BaseModel]) -> Place:
     """Follow pydantic's location through the data, as far as a key whose value is named as a whole.
 
     Names of union branches, which pydantic mixes in, are left out.
     """
     path: KeyPath = ()
     value: Any = data
-    annotation: Any = CaseSpec
+    annotation: Any = root
     field: FieldInfo | None = None
-    table: type[BaseModel] = CaseSpec
+    table: type[BaseModel] = root
     for position, item in enumerate(loc):
         last = position == len(loc) - 1
         table_here = isinstance(value, dict)

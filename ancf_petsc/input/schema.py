@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from ancf_petsc.axes import AXES
 from ancf_petsc.input.analysis import (
@@ -18,6 +18,7 @@ from ancf_petsc.input.analysis import (
     InitialSpec,
     StaticsSpec,
 )
+from ancf_petsc.input.interval import EXPECTED, checked
 from ancf_petsc.input.loads import ForceSpec, GravitySpec, LoadSpec
 from ancf_petsc.input.types import (
     Axes,
@@ -25,6 +26,7 @@ from ancf_petsc.input.types import (
     Count,
     Direction,
     DirectionKey,
+    Fixed,
     Name,
     Points,
     RampKey,
@@ -57,7 +59,9 @@ class MeshSpec(Table):
         "three whole numbers >= 1; bricks of `body` along x, y, z, such as [4, 4, 8]", None
     )
     hexahedra: bool = key("true to leave the bricks of `divisions` whole", False)
-    flat: Literal["quad", "line"] | None = key('"quad" or "line"; a section or an axis of `body`', None)
+    flat: Literal["triangle", "quad", "line"] | None = key(
+        'one of "triangle", "quad", "line"; a section or an axis of `body`', None
+    )
     element: str = key(
         'a code of the catalogue, in quotes; such as "3413"', pattern=r"^(\d{4}|\d-\d+-\d-\d)(\+\d+)?$"
     )
@@ -146,7 +150,7 @@ class ConstraintSpec(Table):
     """One [[constraint]]: components held (fix) and driven (move) of a group, and of its nodes' slopes held (slopes)."""
 
     group: Name = key("a group's name in quotes; of the mesh file or of [groups]")
-    fix: Axes = key('a list out of "x", "y", "z"; such as ["x", "y"]', ())
+    fix: Fixed = key('a list out of "x", "y", "z" and "normal"; such as ["x", "y"]', ())
     move: dict[Axis, float] = key("displacements by axis; such as { z = -0.025 }", {})
     slopes: Axes = key('a list out of "x", "y", "z"; components of the slopes to hold, such as ["z"]', ())
     ramp: RampKey = key('a ramp; such as "cosine"', "linear")
@@ -184,6 +188,7 @@ class OutputSpec(Table):
 
     symmetry: float = key("a number > 0; 4 for a quarter of the body", 1.0, gt=0)
     curve: CurveSpec | None = key('a table; such as { force = "top.z", stroke = "top.z" }', None)
+    checkpoint: Annotated[str, AfterValidator(checked)] = key(f'{EXPECTED}; such as "10 min"', "10 min")
 
 
 class ProbeSpec(Table):
@@ -198,7 +203,13 @@ class SectionSpec(Table):
     """[section], for plane elements and beams."""
 
     thickness: float | None = key("a number > 0", None, gt=0)
-    plane: Literal["stress", "strain"] | None = key("a kind of plane state", None)
+    plane: Literal["stress", "strain", "axisymmetric"] | None = key("a kind of plane state", None)
+    axis: Axis | None = key(
+        'an axis "x", "y" or "z" in the plane of the mesh; the axis of revolution, through the origin', None
+    )
+    angle: float | None = key(
+        "a number in (0, 360]; degrees of the ring that forces and energies are of", None, gt=0, le=360
+    )
     area: float | None = key("a number > 0", None, gt=0)
     inertia: float | None = key("a number > 0; the second moment of area", None, gt=0)
 
@@ -224,6 +235,11 @@ class CaseSpec(Table):
         'an option with its value, without the leading dash; such as ksp_type = "cg"', {}
     )
     section: SectionSpec | None = key("a table [section]", None)
+
+    @property
+    def is_axisymmetric(self) -> bool:
+        """Whether the body is one of revolution, of which the mesh is the section."""
+        return self.section is not None and self.section.plane == "axisymmetric"
 
     @model_validator(mode="before")
     @classmethod

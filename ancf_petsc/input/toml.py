@@ -76,7 +76,7 @@ def _is_table(value: Any) -> bool:
 
 
 def _pairs(table: dict[str, Any]) -> str:
-    return "".join(f"{_key(name)} = {_value(value)}\n" for name, value in table.items())
+    return "".join(f"{_key(name)} = {value_text(value)}\n" for name, value in table.items())
 
 
 def _key(name: str) -> str:
@@ -87,7 +87,12 @@ def _text(value: str) -> str:
     return dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _value(value: Any) -> str:
+def value_text(value: Any) -> str:
+    """A value as it stands in a file, on one line."""
+    if hasattr(
+        value, "tolist"
+    ):  # numpy's numbers and arrays; np.float64 is a float too, which numpy 2 writes in words
+        return value_text(value.tolist())
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -97,12 +102,10 @@ def _value(value: Any) -> str:
     if isinstance(value, datetime | date | time):
         return value.isoformat()
     if isinstance(value, dict):
-        inner = ", ".join(f"{_key(name)} = {_value(part)}" for name, part in value.items())
+        inner = ", ".join(f"{_key(name)} = {value_text(part)}" for name, part in value.items())
         return f"{{ {inner} }}" if inner else "{}"
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_value, value))}]"
-    if hasattr(value, "tolist"):
-        return _value(value.tolist())
+        return f"[{', '.join(map(value_text, value))}]"
     raise CaseError(
         got=value, expected="a number, text, true or false, a list or a table", cure="convert it first"
     )

@@ -19,9 +19,10 @@ from ancf_petsc.kernel.interface import Floats
 
 
 class MassCells(NamedTuple):
-    """Cells with their masses. nodes (e, a): nodal vectors. weights (e,): mass of each cell.
+    """Cells with their masses. nodes (e, a): nodal vectors. slot (a): 0 for a position, j for the j-th slope.
 
-    shape_mass (a, b): mean of N_a N_b over the reference cell. slot (a): 0 for a position, j for the j-th slope.
+    weights (e, m): coefficients of the mass per volume of the reference cell, shape_mass (m, a, b): means of N_a N_b times
+    their functions over the reference cell; m is 1 where the density of every cell is uniform.
     jacobians (e, s, 3, 3): from the slopes of nodes to those along xi.
     """
 
@@ -49,17 +50,30 @@ def map_rows(matrix, slot, J, mapped):
 
 @register_jitable
 def lump(mass, slot):
-    """Scale the diagonal of a cell's mass (a, b) so that positions carry all of it, and drop the rest.
+    """Scale the diagonal of a cell's mass (a, b) so that positions carry all of it, and drop the rest. In place.
 
     Hinton, Rock and Zienkiewicz, Earthquake Engng Struct. Dyn. 4 (1976) 245: positive for every element.
     """
-    carried = 0.0
+    carried = whole = 0.0
     for a in range(slot.size):
         if slot[a] == 0:
             carried += mass[a, a]
+            for b in range(slot.size):
+                whole += mass[a, b] if slot[b] == 0 else 0.0
     for a in range(slot.size):
         for b in range(slot.size):
-            mass[a, b] = mass[a, b] / carried if a == b else 0.0
+            mass[a, b] = mass[a, b] / carried * whole if a == b else 0.0
+
+
+@register_jitable
+def cell_mass(weights, shape_mass, mass):
+    """The sum of weights (m) times shape_mass (m, a, b) into mass (a, b)."""
+    for a in range(mass.shape[0]):
+        for b in range(mass.shape[1]):
+            total = 0.0
+            for m in range(weights.size):
+                total += weights[m] * shape_mass[m, a, b]
+            mass[a, b] = total
 
 
 @kernel
@@ -68,12 +82,13 @@ def add_mass(cells, lumped, span, graph, mass):
     nodes, weights, shape_mass, slot, jacobians = cells
     (first, last), (pointers, columns) = span, graph
     rows, n = pointers.size - 1, slot.size
-    half, local = np.empty((n, n)), shape_mass.copy()
+    half, local = np.empty((n, n)), np.empty((n, n))
     for e in range(first, last):
+        cell_mass(weights[e], shape_mass, local)
         if jacobians.shape[1] > 0:
-            map_rows(shape_mass, slot, jacobians[e], half)
+            map_rows(local, slot, jacobians[e], half)
             map_rows(half.T, slot, jacobians[e], local)
-        if lumped and (e == first or jacobians.shape[1] > 0):
+        if lumped:
             lump(local, slot)
         for a in range(n):
             i = nodes[e, a]
@@ -82,7 +97,7 @@ def add_mass(cells, lumped, span, graph, mass):
             low, high = pointers[i], pointers[i + 1]
             for b in range(n):
                 place = low + np.searchsorted(columns[low:high], nodes[e, b])
-                mass[place] += weights[e] * local[a, b]
+                mass[place] += local[a, b]
 
 
 @kernel

@@ -7,7 +7,7 @@ forces are mapped back. A (3 J, 3 L, 9 ik) is dP/dF, G (a, 3) the gradients with
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 from ancf_petsc.jit import composed
@@ -258,13 +258,20 @@ def add_products(H, G, first, blocks):
             row[m] += x * along_x[m] + y * along_y[m] + z * along_z[m]
 
 
-def _tangent(law: Law) -> Action:
+@inlined
+def whole(at, A):
+    """The moduli of a solid stay as the law has them."""
+
+
+def tangent_action(law: Law, deformation: Callable, fold: Callable) -> Action:
+    """fold(at, A): from derivatives with respect to F to those with respect to sum_a r_a G_a, in place."""
     moduli = moduli_of(law.tangent)
 
     @composed
     def tangent_at(at, states, parameters, sums, seen):
         blocks, G, A, H = sums
         moduli(deformation(states[0], at), parameters, at.weight, A)
+        fold(at, A)
         cartesian_gradients(at, G)
         stress_changes(A, G, H)
         add_products(H, G, 1, blocks)
@@ -273,7 +280,8 @@ def _tangent(law: Law) -> Action:
     return Action(tangent_at, scatter.matrix_sums, scatter.give_symmetric, named_target)
 
 
-def _mean_tangent(law: Law) -> Action:
+def mean_tangent_action(law: Law, deformation: Callable, fold: Callable) -> Action:
+    """`tangent_action` between two states."""
     block_of = law.mean_tangent
     assert block_of is not None
 
@@ -286,6 +294,7 @@ def _mean_tangent(law: Law) -> Action:
                 block = scale(at.weight, block_of(before, after, unit(K), unit(L), parameters))
                 for ik in range(9):
                     A[K, L, ik] = block[ik]
+        fold(at, A)
         cartesian_gradients(at, G)
         stress_changes(A, G, H)
         add_products(H, G, 0, blocks)
@@ -306,8 +315,8 @@ ANY = Solid(
     close=scatter.give_force,
     add_means=scatter.add_means,
     means=(scatter.mean_sums, scatter.give_means),
-    tangent=_tangent,
-    mean_tangent=_mean_tangent,
+    tangent=partial(tangent_action, deformation=deformation, fold=whole),
+    mean_tangent=partial(mean_tangent_action, deformation=deformation, fold=whole),
 )
 
 

@@ -18,11 +18,12 @@ from ancf_petsc.algebra.graph import block_starts, neighbours
 from ancf_petsc.element.element import Element
 from ancf_petsc.kernel import motion
 from ancf_petsc.kernel.adaptive import leap
-from ancf_petsc.kernel.choice import kernel_set
+from ancf_petsc.kernel.choice import RING, kernel_set
 from ancf_petsc.kernel.constant import MassCells, add_mass, add_mass_blocks, mass_product
 from ancf_petsc.kernel.explicit import EXPLICIT
 from ancf_petsc.kernel.implicit import Scheme, Test, alpha_steps
 from ancf_petsc.kernel.interface import Means, Span, Target
+from ancf_petsc.kernel.revolution import Revolution
 from ancf_petsc.kernel.tables import nodes_with_slopes
 from ancf_petsc.material.models import Law
 
@@ -52,17 +53,22 @@ def deformed(positions: NDArray, seed: int) -> NDArray[np.float64]:
     return positions + DISTORTION * np.random.default_rng(seed).uniform(-1.0, 1.0, positions.shape)
 
 
-def law_calls(element: Element, law: Law, *, mean: bool = False, moving: bool = False) -> Iterator[Call]:
+def law_calls(
+    element: Element, law: Law, *, mean: bool = False, moving: bool = False, axisymmetric: bool = False
+) -> Iterator[Call]:
     """Calls of the kernels of an element and a law.
 
-    mean: those between two states too, for the energy-momentum step. moving: the loops over steps of motions.
+    mean: those between two states too, for the energy-momentum step. moving: the loops over steps of motions. axisymmetric: of
+    a body of revolution, on a ring of radius 1.
     """
     n, d = element.functions, element.cell.dimension
     cells, reference = np.arange(n, dtype=np.int32).reshape(1, n), one_cell(element)
+    reference[element.slot == 0, 0] += float(axisymmetric)
     before, after = deformed(reference, 1), deformed(reference, 2)
     graph, matrix = _matrix(cells)
-    chosen = kernel_set(element)
-    tables = chosen.cells(element, cells, reference, axes=np.eye(3)[:, :d])
+    chosen = kernel_set(element, axisymmetric=axisymmetric)
+    more = {"revolution": Revolution(radial=0, axis=1, angle=1.0)} if chosen is RING else {}
+    tables = chosen.cells(element, cells, reference, axes=np.eye(3)[:, :d], **more)
     kernels, p = chosen.kernels(law), law.parameters(1.0, 0.3)
     rest = (tables, p, Span(0, 1))
     yield Call(kernels.internal_force, ((before,), *rest, np.zeros((n, 3))))
@@ -101,7 +107,7 @@ def _mass_calls(element: Element, cells: NDArray, graph: tuple, matrix: tuple) -
     maps, slot = np.tile(np.eye(3), (1, nodes_with_slopes(element), 1, 1)), element.slot.astype(np.int32)
     mass, shape_mass = np.zeros(len(columns)), deformed(np.eye(n), 3)
     for lumped in (True, False):
-        mass_cells = MassCells(cells, np.ones(1), shape_mass, slot, maps)
+        mass_cells = MassCells(cells, np.ones((1, 1)), shape_mass[None], slot, maps)
         yield Call(add_mass, (mass_cells, lumped, Span(0, 1), graph, mass))
     yield Call(mass_product, (pointers, columns, mass, deformed(np.zeros((n, 3)), 4), np.empty((n, 3))))
     none = np.zeros_like(pointers)

@@ -32,9 +32,10 @@ class Frame(NamedTuple):
 
 
 class At(NamedTuple):
-    """A quadrature point. dN (a, 3): dN/dxi; fraction of the cell's volume and weight, its share of the volume."""
+    """A quadrature point. frame: `Frame`, or what a layout has in its place. dN (a, 3): dN/dxi; fraction of the cell's volume and
+    weight, its share of the volume."""
 
-    frame: Frame
+    frame: Any
     dN: Any
     fraction: float
     weight: float

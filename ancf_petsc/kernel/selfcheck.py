@@ -15,11 +15,11 @@ ROUNDING = {np.float64: 1e-9, np.float32: 1e-4}
 """Of the largest number of an array: machine code adds in another order, and fuses products and sums."""
 
 
-def wrong_kernels(
-    element: Element, laws: Sequence[Law], *, mean: bool = False, moving: bool = False
-) -> list[str]:
-    """Names of the kernels whose machine code gives other numbers than Python does. All laws are loaded before any is tried."""
-    flags = {"mean": mean, "moving": moving}
+def wrong_kernels(element: Element, laws: Sequence[Law], **flags: bool) -> list[str]:
+    """Names of the kernels whose machine code gives other numbers than Python does. All laws are loaded before any is tried.
+
+    flags: of `warmup.Variant`.
+    """
     for law in laws:
         for kernel, arguments in law_calls(element, law, **flags):
             kernel(*arguments)

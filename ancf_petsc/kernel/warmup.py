@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import product
 from pathlib import Path
+from typing import NamedTuple
 
 from ancf_petsc.element.catalog import ELEMENTS
 from ancf_petsc.element.element import Element
@@ -14,33 +16,42 @@ from ancf_petsc.kernel.samples import Call, common_calls, law_calls
 from ancf_petsc.material.models import LAWS, Law
 
 
-def is_compiled(element: Element, laws: Sequence[Law], *, mean: bool = False, moving: bool = False) -> bool:
-    """Whether the machine code of the element with all these laws is in the cache."""
-    return all(_mark(element, law, mean=mean, moving=moving).exists() for law in laws)
+class Variant(NamedTuple):
+    """Which kernels, the flags of this module: those between two states too (mean), the loops over steps of motions (moving), of
+    a body of revolution."""
+
+    mean: bool = False
+    moving: bool = False
+    axisymmetric: bool = False
 
 
-def compile_kernels(
-    element: Element, laws: Sequence[Law], *, mean: bool = False, moving: bool = False
-) -> None:
-    """Compile the kernels of an element for each law, or load them from the cache.
+def is_compiled(element: Element, laws: Sequence[Law], **flags: bool) -> bool:
+    """Whether the machine code of the element with all these laws is in the cache. flags: of `Variant`."""
+    return all(_mark(element, law, Variant(**flags)).exists() for law in laws)
 
-    mean: those between two states too, for the energy-momentum step. moving: the loops over steps of motions.
-    """
+
+def compile_kernels(element: Element, laws: Sequence[Law], **flags: bool) -> None:
+    """Compile the kernels of an element for each law, or load them from the cache. flags: of `Variant`."""
     _make(common_calls(element))
     for law in laws:
-        _make(law_calls(element, law, mean=mean, moving=moving))
-        _mark(element, law, mean=mean, moving=moving).touch()
+        _make(law_calls(element, law, **flags))
+        _mark(element, law, Variant(**flags)).touch()
 
 
-def compiled_sets() -> Iterator[tuple[Element, list[Law], bool, bool]]:
-    """What the cache holds: an element of each kind, the laws, whether kernels between two states and of motions are there."""
-    representatives = {kernel_set(element): element for element in reversed(ELEMENTS.values())}
-    for element in representatives.values():
-        for mean in (False, True):
-            for moving in (False, True):
-                laws = [law for law in LAWS.values() if is_compiled(element, [law], mean=mean, moving=moving)]
-                if laws:
-                    yield element, laws, mean, moving
+def compiled_sets() -> Iterator[tuple[Element, list[Law], dict[str, bool]]]:
+    """What the cache holds: an element of each kind, the laws, the flags of `Variant` of kernels that are there."""
+    representatives = {
+        kernel_set(element, axisymmetric=axisymmetric): (element, axisymmetric)
+        for element in reversed(ELEMENTS.values())
+        for axisymmetric in ((False, True) if element.is_plane else (False,))
+    }
+    for (element, axisymmetric), mean, moving in product(
+        representatives.values(), (False, True), (False, True)
+    ):
+        flags = {"mean": mean, "moving": moving, "axisymmetric": axisymmetric}
+        laws = [law for law in LAWS.values() if is_compiled(element, [law], **flags)]
+        if laws:
+            yield element, laws, flags
 
 
 def clear_cache() -> None:
@@ -54,7 +65,8 @@ def _make(calls: Iterable[Call]) -> None:
         kernel(*arguments)
 
 
-def _mark(element: Element, law: Law, *, mean: bool, moving: bool) -> Path:
+def _mark(element: Element, law: Law, variant: Variant) -> Path:
     """The file that says: compiled. Elements of one kernel set share their machine code."""
-    name = f"{kernel_set(element).name}.{law.name}-{digest(law.tangent)}{'.mean' * mean}{'.motion' * moving}.compiled"
-    return CACHE_FOLDER / name
+    kernels = kernel_set(element, axisymmetric=variant.axisymmetric).name
+    more = f"{'.mean' * variant.mean}{'.motion' * variant.moving}"
+    return CACHE_FOLDER / f"{kernels}.{law.name}-{digest(law.tangent)}{more}.compiled"

@@ -10,7 +10,13 @@ from ancf_petsc.element.element import Element
 from ancf_petsc.mesh.mesh import Floats, Integers, Mesh
 from ancf_petsc.mesh.parts import row_keys
 
-QUADRATIC = {"line": "line3", "quad": "quad8", "tetra": "tetra10", "hexahedron": "hexahedron20"}
+QUADRATIC = {
+    "line": "line3",
+    "triangle": "triangle6",
+    "quad": "quad8",
+    "tetra": "tetra10",
+    "hexahedron": "hexahedron20",
+}
 
 
 @dataclass(frozen=True)

@@ -48,8 +48,8 @@ def make_mesh(
 ) -> Path:
     """Writes a mesh of one of BODIES as a Gmsh file and returns its path.
 
-    flat: "quad" for the section of a box half way along y, "line" for its axis along x, with the groups that cut them.
-
+    flat: the section of a box half way along y, that of a body of revolution in the plane x-z, with the groups that cut it:
+    "triangle", or of a box "quad"; "line" for a box's axis along x.
     size: length of edges of an unstructured mesh, rim: at rims of bonded faces and roots, where stresses are
     singular; edges grow with the distance from them. divisions: bricks (nx, ny, nz) of a structured one, for
     pvc_block across the wall, around, over the height. order 2 adds mid-nodes on straight edges.
@@ -58,13 +58,18 @@ def make_mesh(
     body = _checked_request(
         name, size=size, rim=rim, divisions=divisions, order=order, hexahedra=hexahedra, version=version
     )
+    _check_grid(name, flat, structured=divisions is not None or hexahedra)
     path = Path(path)
     if path.suffix != ".msh":
         raise CaseError("the mesh file's name", key="--out", got=str(path), expected="a name ending in .msh")
     if not path.parent.is_dir():
         raise CaseError("there is no such folder", key="--out", got=str(path.parent), cure="make it first")
     if flat:
-        _write(path, *_flat(body, body.divisions if divisions is None else divisions, flat), order, version)
+        if flat == "triangle" and divisions is None:
+            points, cells = _unstructured(body, body.size if size is None else size, rim, 2)
+        else:
+            points, cells = _flat(body, body.divisions if divisions is None else divisions, flat)
+        _write(path, points, _flat_groups(body, points, cells, flat), order, version)
         return path
     if divisions is None and not hexahedra:
         points, cells = _unstructured(body, body.size if size is None else size, rim)
@@ -106,6 +111,17 @@ def _checked_request(
     return BODIES[name]
 
 
+def _check_grid(name: str, flat: str, *, structured: bool) -> None:
+    """A section that is revolved is no parallelogram and is meshed by Gmsh alone."""
+    body = BODIES[name]
+    if flat in ("quad", "line") and body.revolved:
+        cure = "--flat triangle, or no --flat for the quarter"
+        raise CaseError(f"the section of {name} is no parallelogram", key="--flat", got=flat, cure=cure)
+    if flat and structured and body.revolved:
+        cure = "give --size, and --rim for finer edges at roots and bonded rims"
+        raise CaseError(f"the section of {name} is meshed by Gmsh", key="--divisions", got="given", cure=cure)
+
+
 def _check_rim(name: str, rim: float, size: float | None, *, structured: bool) -> None:
     body = BODIES[name]
     if structured:
@@ -120,33 +136,40 @@ def _check_rim(name: str, rim: float, size: float | None, *, structured: bool) -
         )
 
 
-def _unstructured(body: Primitive, size: float, rim: float | None) -> tuple[Floats, Integers]:
-    """Points (n, 3) and tetrahedra (e, 4) by Gmsh, in its numbering."""
+def _unstructured(
+    body: Primitive, size: float, rim: float | None, dimension: int = 3
+) -> tuple[Floats, Integers]:
+    """Points (n, 3) and tetrahedra (e, 4), or triangles (e, 3) of the section, by Gmsh, in its numbering."""
     options = {"Mesh.MeshSizeMin": rim or size, "Mesh.MeshSizeMax": size}
     with gmsh_session(**options) as gmsh:
-        body.build(gmsh)
+        build = body.build if dimension == 3 else body.section
+        assert build
+        build(gmsh)
         gmsh.model.occ.synchronize()
         if rim is not None:
-            grade(gmsh, _rim_curves(gmsh, body), size, rim)
+            places = _rim_curves(gmsh, body) if dimension == 3 else _rim_points(gmsh, body)
+            grade(gmsh, places, size, rim, "Curves" if dimension == 3 else "Points")
         try:
-            gmsh.model.mesh.generate(3)
+            gmsh.model.mesh.generate(dimension)
         except Exception as error:
             raise CaseError(
                 f"Gmsh cannot mesh the body ({error})", key="--size", got=size, cure=f"try {body.size:g}"
             ) from None
         numbers, coordinates, _ = gmsh.model.mesh.getNodes()
-        _, nodes = gmsh.model.mesh.getElementsByType(KINDS["tetra"].gmsh)
+        _, nodes = gmsh.model.mesh.getElementsByType(KINDS["tetra" if dimension == 3 else "triangle"].gmsh)
     order = np.argsort(numbers)
     cells = np.searchsorted(numbers[order], nodes)
     used, cells = np.unique(cells, return_inverse=True)
-    return coordinates.reshape(-1, 3)[order[used]], cells.reshape(-1, 4)
+    cells = cells.reshape(-1, dimension + 1)
+    # Faces in x-z have their normal along y, where the plane of z and x is seen from behind.
+    return coordinates.reshape(-1, 3)[order[used]], cells if dimension == 3 else cells[:, [0, 2, 1]]
 
 
-def grade(gmsh: Any, curves: Sequence[int], size: float, rim: float) -> None:
-    """Let edges grow from `rim` at the curves with the distance from them, to `size`."""
+def grade(gmsh: Any, places: Sequence[int], size: float, rim: float, kind: str = "Curves") -> None:
+    """Let edges grow from `rim` at the curves, or Points, with the distance from them, to `size`."""
     field = gmsh.model.mesh.field
     distance, length = field.add("Distance"), field.add("Threshold")
-    field.setNumbers(distance, "CurvesList", curves)
+    field.setNumbers(distance, f"{kind}List", places)
     field.setNumber(distance, "Sampling", SAMPLING)
     values = {
         "InField": distance,
@@ -175,6 +198,16 @@ def _rim_curves(gmsh: Any, body: Primitive) -> list[int]:
     return found
 
 
+def _rim_points(gmsh: Any, body: Primitive) -> list[int]:
+    """Points of the section on planes of rims."""
+    places = {tag: gmsh.model.getValue(0, tag, []) for _, tag in gmsh.model.getEntities(0)}
+    return [
+        tag
+        for tag, place in places.items()
+        if any(abs(place["xyz".index(axis)] - level) < BOX_MARGIN for axis, level in body.rims)
+    ]
+
+
 def bricks(grid: Floats) -> tuple[Floats, Integers]:
     """Points (n, 3), x running fastest, and bricks (e, 8) of a grid (nz + 1, ny + 1, nx + 1, 3)."""
     index = np.arange(grid[..., 0].size).reshape(grid.shape[:3])
@@ -183,10 +216,8 @@ def bricks(grid: Floats) -> tuple[Floats, Integers]:
     return grid.reshape(-1, 3), np.stack([corner.ravel() for corner in lower + upper], axis=1)
 
 
-def _flat(
-    body: Primitive, divisions: Sequence[int], kind: str
-) -> tuple[Floats, list[tuple[str, int, Integers]]]:
-    """Points and groups of the section half way along y (quadrilaterals in z-x) or of the axis along x (lines)."""
+def _flat(body: Primitive, divisions: Sequence[int], kind: str) -> tuple[Floats, Integers]:
+    """Points and cells of the section half way along y (in z-x) or of the axis along x; triangles are halves of quadrilaterals."""
     d = KINDS[kind].dimension
     nx, _, nz = divisions
     grid = body.grid((nx, 2, 2 * nz if d == 2 else 2))[:, 1]
@@ -194,18 +225,29 @@ def _flat(
     index = np.arange(grid[..., 0].size).reshape(grid.shape[:2])
     corners = [index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]]
     cells = np.stack([c.ravel() for c in (corners if d == 2 else (index[:, :-1], index[:, 1:]))], axis=1)
-    points, spanned = grid.reshape(-1, 3), "xz"[:d]
+    if kind == "triangle":
+        cells = cells[:, ((0, 1, 2), (0, 2, 3))].reshape(-1, 3)
+    return grid.reshape(-1, 3), cells
+
+
+def _flat_groups(
+    body: Primitive, points: Floats, cells: Integers, kind: str
+) -> list[tuple[str, int, Integers]]:
+    """Name, dimension, parts (m, corners) of the groups that cut a section or an axis."""
+    d = KINDS[kind].dimension
+    spanned = "xz"[:d]
     sides = outer_sides(kind, cells, len(points))
     groups: list[tuple[str, int, Integers]] = []
     for name, planes in body.faces.items():
-        if all(axis in spanned for axis, _ in planes):
-            groups.append((name, d - 1, sides[_on(points, planes)[sides].all(axis=1)]))
+        on = sides[_on(points, planes)[sides].all(axis=1)]
+        if all(axis in spanned for axis, _ in planes) and len(on):
+            groups.append((name, d - 1, on))
     for name, lines in body.edges.items():
         kept = [line for line in lines if all(axis in spanned for axis, _ in line)]
         if kept:
             nodes = np.flatnonzero(np.any([_on(points, line) for line in kept], axis=0))
             groups.append((name, 0, nodes[:, None]))
-    return points, [*groups, ("solid", d, cells)]
+    return [*groups, ("solid", d, cells)]
 
 
 def _group_parts(

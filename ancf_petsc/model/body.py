@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ancf_petsc.element.element import Element
 from ancf_petsc.kernel.interface import Kernels, Span
+from ancf_petsc.kernel.revolution import Revolution
 from ancf_petsc.kernel.tables import map_functions
 from ancf_petsc.material import Law
 from ancf_petsc.parallel.exchange import combined
@@ -54,7 +55,7 @@ class Body:
     j-th slope of its node, which follows the position j places behind. Slopes are multiplied by lengths.
     tables: the cells as every kernel takes them, see `kernel/choice`; they have nodes (e, a) and volumes (e,).
     size: diagonal of the box around the body. cell_numbers: (e,) number of each cell in the mesh file. lumped: whether mass, and
-    what gravity pulls at, are those of a diagonal matrix.
+    what gravity pulls at, are those of a diagonal matrix. revolution: of a body of revolution.
     """
 
     comm: MPI.Comm
@@ -68,6 +69,7 @@ class Body:
     size: float
     cell_numbers: NDArray[np.int64]
     lumped: bool
+    revolution: Revolution | None
 
     @property
     def owned(self) -> int:
@@ -90,6 +92,11 @@ class Body:
         return self.tables.volumes
 
     @property
+    def measures(self) -> Floats:
+        """(e, m) coefficients of the undeformed volume per volume of the reference cell: of 1, and of xi where cells are rings."""
+        return self.volumes[:, None] if self.revolution is None else self.tables.measures
+
+    @property
     def dof(self) -> int:
         """Degrees of freedom over all ranks, driven ones included."""
         return combined(self.comm, self.element.components * self.owned)
@@ -99,9 +106,9 @@ class Body:
         """The owned nodal vectors that are positions."""
         return np.flatnonzero(self.slots[: self.owned] == 0)
 
-    def mapped(self, values: NDArray) -> Floats:
-        """Functions (e, a) of the nodal vectors of all cells from those of the reference cell (a,)."""
-        return map_functions(values, self.slope_maps, self.element)
+    def mapped(self, values: NDArray, cells: NDArray | slice = slice(None)) -> Floats:
+        """Functions (e, a) of the nodal vectors of cells, all by default, from those of the reference cell (a,)."""
+        return map_functions(values, self.slope_maps[cells], self.element)
 
     @property
     def slope_maps(self) -> Floats:

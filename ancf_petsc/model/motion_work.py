@@ -8,7 +8,8 @@ polynomial through the last states, as along a quasi-static path.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,24 @@ class MotionWork:
         self._driven = PathWork(drives, [])
         self._drives = any(drive.amplitude for drive in drives)
         self._time, self._powers = 0.0, Powers(0.0, 0.0, np.zeros(0), np.zeros(0), np.zeros(0))
+
+    def state(self) -> dict[str, Any]:
+        """The sums, and what goes on from."""
+        return {
+            "dissipated": self.dissipated,
+            "of_loads": self._of_loads,
+            "of_impulses": self._of_impulses,
+            "driven": self._driven.state(),
+            "time": self._time,
+            "powers": asdict(self._powers),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state."""
+        self.dissipated, self._of_loads = state["dissipated"], state["of_loads"]
+        self._of_impulses, self._time = state["of_impulses"], state["time"]
+        self._driven.restore(state["driven"])
+        self._powers = Powers(**state["powers"])
 
     @property
     def external(self) -> float:

@@ -8,6 +8,7 @@ polynomials through the last accepted states: over the displacement a force is s
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,21 @@ class PathWork:
         self._settled = False
         self._states: list[tuple[float, NDArray, NDArray, float | None]] = []
 
+    def state(self) -> dict[str, Any]:
+        """The sum, and what goes on from."""
+        return {
+            "total": self.total,
+            "before": self._before,
+            "settled": self._settled,
+            "states": [list(state) for state in self._states],
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state."""
+        self.total, self._before = state["total"], state["before"]
+        self._settled = state["settled"]
+        self._states = [(s, reactions, seen, length) for s, reactions, seen, length in state["states"]]
+
     def start(
         self, s: float, reactions: NDArray, displacements: NDArray, length: float | None = None
     ) -> None:
@@ -53,6 +69,20 @@ class PathWork:
         else:
             self.total = self._before + sum(self._increment(k) for k in range(1, newest + 1))
             self._settled = newest == POINTS - 1
+
+    def jump(self, s: float, reactions: NDArray, displacements: NDArray) -> float:
+        """Go on to the state at s which the body has come to under the loads and moves of s; the path begins anew there. Returns
+        the work in between: moves come first, against the reactions before.
+        """
+        before, reactions_before, seen_before, _ = self._states[-1]
+        work = 0.0
+        for m, drive in enumerate(self.drives):
+            work += drive.amplitude * (drive.ramp.value(s) - drive.ramp.value(before)) * reactions_before[m]
+        for number, load in enumerate(self.loads):
+            work += load.ramp.value(s) * (displacements[number] - seen_before[number])
+        self.total += work
+        self.start(s, reactions, displacements)
+        return work
 
     def _increment(self, k: int) -> float:
         """Work between states k - 1 and k."""

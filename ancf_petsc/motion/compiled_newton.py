@@ -58,8 +58,15 @@ class CompiledNewton:
         self.aged = self.aged or status != DONE
         return progress.step, progress.newton, status == DONE
 
+    def restore(self, *, aged: bool) -> None:
+        """Go on with the matrix that the solver has."""
+        self.aged = not (self.solver.matrix.largest_diagonal and self._factorised()) or aged
+
     def _renew(self) -> bool:
         """Factor at d; False where the matrix is not positive definite."""
         self.solver.fill(self.solver.d)
+        return self._factorised()
+
+    def _factorised(self) -> bool:
         values = self.solver.matrix.values
         return factorise(self._starts, self._pointers, self._columns, values, self._free, self._factor)

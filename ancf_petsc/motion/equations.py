@@ -46,6 +46,15 @@ class Equations:
         self._steady = all(load.ramp.kind == "constant" for load in model.loads)
         self._loads = assembly.external_force(0.0)
 
+    @property
+    def piece(self) -> int:
+        """Of the smooth pieces between corners the one that was entered last, from 0."""
+        return self._piece
+
+    @piece.setter
+    def piece(self, number: int) -> None:
+        self._piece = number
+
     # --- what is prescribed
 
     def loads(self, t: float) -> NDArray[np.float64]:
@@ -55,8 +64,8 @@ class Equations:
     def driven_positions(self, t: float) -> NDArray[np.float64]:
         """Of the driven degrees of freedom (c,), in the order of `assembly.driven`."""
         values = [drive.value(t / self.duration) for drive in self.assembly.model.drives]
-        reference = self.assembly.model.reference.ravel()[self.assembly.driven]
-        return reference + np.array(values or [0.0])[self.assembly.driven_by]
+        start = self.assembly.start.ravel()[self.assembly.driven]
+        return start + np.array(values or [0.0])[self.assembly.driven_by]
 
     def driven_velocities(self, t: float) -> NDArray[np.float64]:
         """Of the driven degrees of freedom (c,); at the end of a smooth piece those it ends with."""

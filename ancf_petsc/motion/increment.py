@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +18,16 @@ from petsc4py import PETSc
 from ancf_petsc.model.matrix import Matrix
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.parallel.exchange import combined
+from ancf_petsc.parallel.fields import field
 from ancf_petsc.solve.linear.solver import LinearSolver
 from ancf_petsc.solve.newton import MOST_ITERATIONS
-from ancf_petsc.solve.petsc import default_options
+from ancf_petsc.solve.petsc import NOT_FINITE, default_options
 
 Reason = PETSc.SNES.ConvergedReason
 SLOW = 0.1  # a residual that falls by less asks for a new matrix: factoring costs some five iterations
 ROUNDING = 4e-16  # of a position: what it leaves of forces is this times stiffness and position
 WORDS = {
-    Reason.DIVERGED_FNORM_NAN: "forces are not finite",
+    NOT_FINITE: "forces are not finite",
     Reason.DIVERGED_MAX_IT: f"no convergence in {MOST_ITERATIONS} Newton iterations",
     Reason.DIVERGED_LINE_SEARCH: "no step along Newton's direction lowers the out-of-balance force",
     Reason.DIVERGED_LINEAR_SOLVE: "the linear solver failed",
@@ -63,7 +65,7 @@ class ForceTest:
     def __call__(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         residual = norms[2]
         if not isfinite(residual):
-            return Reason.DIVERGED_FNORM_NAN
+            return NOT_FINITE
         forces = sqrt(combined(self.matrix.comm, self.scale))
         relative, absolute = snes.getTolerances()[:2]
         if iteration:
@@ -103,6 +105,7 @@ class IncrementSolver:
         self.test = ForceTest(self.matrix, x)
         self.newton = self.linear_iterations = 0
         self._always_new = False
+        self._made: tuple[NDArray, NDArray] | None = None  # state and increment, of the matrix
         self._residual = self.assembly.vector()
         self._quick = self._create("basic")
         self.linear = LinearSolver(self.assembly, self.matrix, self._quick.getKSP(), with_mass=True)
@@ -139,8 +142,25 @@ class IncrementSolver:
             self._always_new = False
         return None if reason > 0 else WORDS.get(reason, f"PETSc's reason {reason}")
 
+    def state(self) -> dict[str, Any]:
+        """The matrix that is kept from step to step, as what it was made of."""
+        made = None if self._made is None else [field(values) for values in self._made]
+        return {"aged": self.test.aged, "made": made, "largest_diagonal": self.matrix.largest_diagonal}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Make the matrix of a state anew; the state x stays. Collective."""
+        if state["made"] is not None:
+            x = self.x.array_r.copy()
+            made_at, d = (values.ravel() for values in state["made"])
+            self.x.array[:], self.d.array[:] = made_at, d
+            self.fill(self.d)
+            self.linear.take(self.x)
+            self.x.array[:] = x
+        self.test.aged, self.matrix.largest_diagonal = state["aged"], state["largest_diagonal"]
+
     def fill(self, d: PETSc.Vec) -> None:
         """Make the matrix the derivative of the forces at d."""
+        self._made = self.x.array_r.copy(), d.array_r.copy()
         self.matrix.clear()
         self.tangent(d, self.matrix)
         self.matrix.finish()

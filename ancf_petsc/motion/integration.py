@@ -7,11 +7,15 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from math import isfinite
 
+import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.errors import Interrupted, MotionStopped
 from ancf_petsc.motion.integrators import Integrator, Step, steps_in
 
+SHORTER = 32
+"""How many times shorter the step is that tells a step too long from a motion that cannot go on."""
 log = logging.getLogger("ancf")
 
 
@@ -46,6 +50,8 @@ class TimeIntegration:
         asked to stop.
         """
         for begin, end in pairwise(self.marks):
+            if end <= self.integrator.time:  # before a state that the motion goes on from
+                continue
             for goal in self._goals(begin, end):
                 while self.integrator.time < goal:
                     self._advance(goal)
@@ -74,12 +80,33 @@ class TimeIntegration:
             if not isfinite(integrator.x.norm() + fastest * fastest):
                 reached, integrator.time = integrator.time, start
                 raise integrator.failed(reached, "numbers are not finite any more")
-        except MotionStopped:
-            integrator.time, integrator.a = start, carried
-            for kept, now in zip(self._before, (integrator.x, integrator.v), strict=True):
-                kept.copy(now)
-            raise
+        except MotionStopped as error:
+            self._go_back(start, carried)
+            kind = "step_too_long" if self._is_too_long(goal) else "diverged"
+            self._go_back(start, carried)
+            raise MotionStopped(str(error), {**error.facts, "kind": kind, "time": start}) from error
         self.on_step(step)
+
+    def _go_back(self, time: float, carried: NDArray[np.float64]) -> None:
+        """To the state before the step."""
+        self.integrator.time, self.integrator.a = time, carried
+        for kept, now in zip(self._before, (self.integrator.x, self.integrator.v), strict=True):
+            kept.copy(now)
+
+    def _is_too_long(self, goal: float) -> bool:
+        """Whether the step that failed was longer than the method's limit, or one much shorter goes on from there. Collective."""
+        integrator, size = self.integrator, self.integrator.settings.step
+        if integrator.adaptive:
+            return False
+        if integrator.longest_stable is not None:
+            return size > integrator.longest_stable
+        start = integrator.time
+        try:
+            integrator.restart()
+            integrator.step_to(start + min(size, goal - start) / SHORTER)
+        except MotionStopped:
+            return False
+        return isfinite(integrator.x.norm() + integrator.v.norm() ** 2)
 
 
 def warn_of_long_step(integrator: Integrator, size: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import time
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 from ancf_petsc.parallel.slabs import slab_bounds
 
 T = TypeVar("T")
+PATIENCE = 3.0
+"""Seconds that other ranks have to meet the error of one."""
 
 
 def combined(comm: MPI.Comm, value: T, op: MPI.Op = MPI.SUM) -> T:
@@ -53,6 +56,20 @@ def agree(comm: MPI.Comm, work: Callable[[], T]) -> T:
     if first is not None:
         raise failure or first
     return result  # type: ignore[return-value]
+
+
+def all_meet(comm: MPI.Comm) -> bool:
+    """Whether all ranks come here within PATIENCE: errors of this program are raised on all of them, and one that is not leaves
+    the others waiting elsewhere.
+    """
+    if comm.size == 1:
+        return True
+    request, end = comm.Ibarrier(), time.monotonic() + PATIENCE
+    while not request.Test():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.001)
+    return True
 
 
 def _portable(error: Exception) -> Exception:

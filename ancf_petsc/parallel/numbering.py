@@ -69,10 +69,13 @@ def with_vectors(nodes: Numbering, first: NDArray, node: NDArray, slot: NDArray)
     )
 
 
-def distribute(comm: MPI.Comm, cells: NDArray, total: int) -> Numbering:
-    """Divide `total` nodes between the ranks, given this rank's slab of the cells (e, k). Collective."""
+def distribute(comm: MPI.Comm, cells: NDArray, total: int, parts: NDArray | None = None) -> Numbering:
+    """Divide `total` nodes between the ranks, given this rank's slab of the cells (e, k). Collective.
+
+    parts: this rank's slab of the ranks of the nodes, where they are known.
+    """
     bounds = slab_bounds(total, comm.size)
-    parts = partition_nodes(comm, cells, total)
+    parts = partition_nodes(comm, cells, total) if parts is None else parts
     cells, file_cells = _send_cells(
         comm, cells, lookup(comm, bounds, parts, cells.ravel()).reshape(cells.shape)
     )

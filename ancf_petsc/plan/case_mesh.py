@@ -8,7 +8,6 @@ from pathlib import Path
 from ancf_petsc.element.catalog import element
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input.load import Case
-from ancf_petsc.mesh.made import Request, made_mesh
 from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.mesh.read import read_mesh
 from ancf_petsc.mesh.refine import refine
@@ -21,6 +20,8 @@ def mesh_file(case: Case) -> Path:
         return Path(
             os.path.realpath(case.folder / str(asked.file))
         )  # Path.resolve raises on links in a circle
+    from ancf_petsc.mesh.made import Request, made_mesh  # making meshes is rare, and takes time to import
+
     try:
         return made_mesh(
             Request(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ancf_petsc.mesh.groups import measure, surface_of
+from ancf_petsc.mesh.groups import surface_of
 from ancf_petsc.mesh.mesh import Group
 from ancf_petsc.plan.part import Floats, Part
 
@@ -45,11 +45,12 @@ def enter_stroke(part: Part, curve: CurveChoice | None) -> dict[str, Floats]:
 
 
 def _area(part: Part, group: Group) -> float | None:
-    """Undeformed area of a group that is a surface; of a plane body the length of its sides times the thickness."""
+    """Undeformed area of a group that is a surface; of a plane body the length of its sides times the thickness, of a body of
+    revolution what they sweep."""
     d = part.element.cell.dimension
     faces = surface_of(part.mesh, group) if d > 1 else None
     if faces is None:
         return None
     section = part.spec.section
     thickness = section.thickness if section and section.thickness else 1.0
-    return part.total(measure(part.mesh, d - 1, faces)) * thickness
+    return part.total(float(part.space.sizes(d - 1, faces).sum())) * thickness

@@ -5,10 +5,11 @@ from __future__ import annotations
 from ancf_petsc.input.schema import CaseSpec
 
 FROM = 0.45
-"""Poisson's ratio from which linear elements are warned of: docs/elements.md has what they err by."""
+"""Poisson's ratio from which linear elements are warned of: docs/stability.md has what they err by."""
 INSTEAD = {
     "3413": 'element = "3-10-1-3" on the same mesh',
     "3813": 'element = "3843" where cells are parallelepipeds, else tetrahedra with "3-10-1-3"',
+    "2312": 'element = "2-6-1-2" on the same mesh',
     "2412": 'element = "2432"',
 }
 
@@ -23,7 +24,7 @@ def locking_notes(spec: CaseSpec) -> list[str]:
         return []
     return [
         f"element {code} with poisson = {material.poisson:g} is too stiff, by factors the closer to 0.5 "
-        f"(docs/elements.md, Near nu = 0.5): take {INSTEAD[code]}"
+        f"(docs/stability.md, Near nu = 0.5): take {INSTEAD[code]}"
         for material in spec.material
         if material.poisson >= FROM
     ]

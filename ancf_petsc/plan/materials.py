@@ -66,7 +66,7 @@ def regions(
     spec: CaseSpec, element: Element, material: NDArray[np.int64], own: NDArray[np.bool_]
 ) -> tuple[Region, ...]:
     """The regions of this rank's cells, which are sorted by material (e,) and, within one, own ones first: own (e,)."""
-    found, kernels = [], kernel_set(element)
+    found, kernels = [], kernel_set(element, axisymmetric=spec.is_axisymmetric)
     for number, given in enumerate(spec.material):
         first, last = np.searchsorted(material, (number, number + 1))
         law = law_named(given.law)

@@ -16,6 +16,7 @@ from ancf_petsc.element.catalog import element
 from ancf_petsc.element.element import Element
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input.load import Case
+from ancf_petsc.kernel.revolution import Revolution
 from ancf_petsc.mesh.complete import complete
 from ancf_petsc.mesh.groups import choose_groups
 from ancf_petsc.mesh.mesh import Mesh
@@ -37,7 +38,8 @@ class Plan:
     """Tables over the nodal vectors (v) and cells (e) of a part of the mesh, in file order.
 
     space: nodes, nodal vectors and cells. material (e,): index into the case's materials. loads: number of a load -> (v,) what it
-    entered. members: group -> (v,) bool, positions of its nodes. means: name -> (v,) weights of a mean position.
+    entered. members: group -> (v,) bool, positions of its nodes. means: name -> (v,) weights of a mean position. revolution: of a
+    body whose section the mesh is.
     """
 
     mesh: Mesh
@@ -49,6 +51,7 @@ class Plan:
     loads: dict[int, NDArray]
     members: dict[str, NDArray]
     means: dict[str, NDArray]
+    revolution: Revolution | None
 
 
 def make_plan(case: Case) -> Plan:
@@ -87,6 +90,7 @@ def plan_on(case: Case, mesh: Mesh) -> Plan:
         loads=enter_loads(part),
         members=_members(part),
         means=enter_stroke(part, curve) | enter_probes(part),
+        revolution=part.revolution,
     )
 
 

@@ -62,6 +62,8 @@ def _actions(space: Space, spec: CaseSpec) -> Iterator[tuple[str, NDArray]]:
         yield f"constraint.{row.group}.move", np.array([row.move.get(axis, 0.0) for axis in AXES])  # type: ignore[call-overload]
     if spec.initial:
         yield "initial.velocity", np.array(spec.initial.velocity)
+        if spec.is_axisymmetric:
+            return  # which says of itself that it does not rotate
         turning = np.abs(np.cross(spec.initial.spin, space.axes.T)).max(axis=0)
         about_itself = np.linalg.norm(turning) <= ACROSS * np.linalg.norm(spec.initial.spin)
         yield "initial.spin", np.zeros(3) if about_itself else turning

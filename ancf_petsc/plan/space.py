@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ancf_petsc.element.element import Element
 from ancf_petsc.element.shape import ElementTables
 from ancf_petsc.errors import MeshError
+from ancf_petsc.kernel.revolution import Revolution, linear, radii_of
 from ancf_petsc.kernel.tables import map_functions, nodes_with_slopes, slope_maps
 from ancf_petsc.mesh.kinds import part_kind, part_sizes
 from ancf_petsc.mesh.mesh import Mesh
@@ -26,7 +27,7 @@ class Space:
     cells (e, k): nodes of the cells. first (n + 1,): first nodal vector of each node, its position; its slopes follow.
     axes (3, d): directions the body lies along. frames (n, 3, 3): columns are the directions of the slopes of each node.
     lengths (n,): what a slope is multiplied with to be a nodal vector: the size of the cells around the node, so that
-    all nodal vectors are lengths and all that works on them forces.
+    all nodal vectors are lengths and all that works on them forces. revolution: of a body whose section the mesh is.
     """
 
     def __init__(self, mesh: Mesh, element: Element) -> None:
@@ -40,6 +41,7 @@ class Space:
             counts[self.cells[:, : len(element.cell.corners)]] = element.corner
         self.first = np.concatenate(([0], np.cumsum(counts)))
         self.axes = self._axes()
+        self.revolution: Revolution | None = None
         self.frames = self._default_frames() if element.has_slopes else None
         self.lengths = self._lengths() if element.has_slopes else None
 
@@ -83,14 +85,31 @@ class Space:
         if dimension == 0:
             shares[self.first[self.compact[parts]]] = 1.0 / len(parts)
             return shares
-        sizes = np.abs(part_sizes(self.mesh.points, parts, part_kind(dimension, parts.shape[1])))
+        sizes = self.sizes(dimension, parts)
         for cells, rows, tables in self._places_of(dimension, parts):
+            weights = tables.weights / tables.weights.sum()
             means = map_functions(
-                tables.weights @ tables.values / tables.weights.sum(), self._maps(cells), self.element
+                self._densities(cells, tables) * weights @ tables.values, self._maps(cells), self.element
             )
             vectors = self.first[self.cells[cells][:, self.element.node]] + self.element.slot
             np.add.at(shares, vectors, sizes[rows, None] / sizes.sum() * means)
         return shares
+
+    def sizes(self, dimension: int, parts: Integers) -> Floats:
+        """Undeformed length, area or volume (m,) of parts (m, corners); of a body of revolution of what they sweep."""
+        sizes = np.abs(part_sizes(self.mesh.points, parts, part_kind(dimension, parts.shape[1])))
+        if self.revolution is None:
+            return sizes
+        radii = self.mesh.points[parts, self.revolution.radial].mean(axis=1)
+        return self.revolution.angle * radii * sizes
+
+    def _densities(self, cells: Integers, tables: ElementTables) -> Floats:
+        """(m, q) what points of cells count, 1 on the mean: in a body of revolution their radii."""
+        if self.revolution is None:
+            return np.ones((1, len(tables.weights)))
+        radii = radii_of(self._geometry(cells), self.axes, self.revolution.radial) @ linear(tables.points).T
+        means = radii @ tables.weights / tables.weights.sum()
+        return radii / np.where(means > 0.0, means, 1.0)[:, None]
 
     def _places_of(self, dimension: int, parts: Integers) -> list[tuple[Integers, Integers, ElementTables]]:
         """Where parts lie in cells: (cells, rows of parts, shape functions on that place of the cell), place by place."""
@@ -126,7 +145,7 @@ class Space:
         """Shape functions on the whole cell or on a part of it."""
         if len(place) == len(self.element.cell.corners):
             return self.element.tables("mass")
-        return self.element.part_tables(place, self.element.degree)
+        return self.element.part_tables(place, self.element.degree + (self.revolution is not None))
 
     def _maps(self, cells: Integers) -> Floats:
         """(e, s, 3, 3) of some cells; see `slope_maps`."""

@@ -16,11 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ancf_petsc.errors import CaseError, cannot_write, error_number
+from ancf_petsc.results.checkpoint_file import NAMES, sweep, sync
 from ancf_petsc.results.mark import MARK, Mark, read_mark, refuse_live_run
 from ancf_petsc.results.tables import file_text
 
 RUN_FILES = (
-    "results.h5", "results.xdmf", "curve.csv", "probes.csv", "modes.csv", "summary.json", "log.txt"
+    *NAMES, "results.h5", "results.xdmf", "curve.csv", "probes.csv", "modes.csv", "summary.json", "log.txt"
 )  # fmt: skip
 STATUSES = ("done", "stopped", "interrupted")
 log = logging.getLogger("ancf")
@@ -33,11 +34,14 @@ class Holding(NamedTuple):
     identity: str
 
 
-def check_folder(path: Path, title: str, identity: str = "", *, force: bool = False) -> None:
+def check_folder(
+    path: Path, title: str, identity: str = "", *, force: bool = False, kept: bool = False
+) -> None:
     """Raise CaseError unless a run of `title` may write into `path`; nothing in it is touched.
 
     A folder may be new, empty, or hold an earlier run of the same case: of the same `identity`, a hash of
-    effective case and mesh. `force` allows any other, but never one that a live run writes into.
+    effective case and mesh. `force` allows any other, but never one that a live run writes into. `kept`: the run goes on
+    with what is there, which has been looked at.
     """
     path = Path(path)
     if "\0" in str(path):
@@ -50,7 +54,7 @@ def check_folder(path: Path, title: str, identity: str = "", *, force: bool = Fa
         with tempfile.TemporaryFile(dir=there):
             pass
     except OSError as error:
-        if error_number(error) in (errno.ENOSPC, errno.EDQUOT):
+        if kept or error_number(error) in (errno.ENOSPC, errno.EDQUOT):
             raise cannot_write(error, path / "results.h5") from error
         raise CaseError(
             f"cannot be written: {error.strerror or error}",
@@ -60,7 +64,7 @@ def check_folder(path: Path, title: str, identity: str = "", *, force: bool = Fa
         ) from error
     if there == path:
         refuse_live_run(path, force=force)
-        _refuse_other_content(path, Holding(title, identity), force=force)
+        _refuse_other_content(path, Holding(title, identity), force=force or kept)
 
 
 def _refuse_other_content(path: Path, ours: Holding, *, force: bool) -> None:
@@ -147,6 +151,7 @@ def claim_folder(path: Path, title: str = "", identity: str = "", *, force: bool
         earlier = run_in(path)
         mark.take({"title": title, "hash": identity}, force=force)
         _refuse_other_content(path, Holding(title, identity), force=force)
+        sweep(path)
         for name in RUN_FILES:
             (path / name).unlink(missing_ok=True)
             (path / f"{name}.part").unlink(missing_ok=True)
@@ -162,11 +167,28 @@ def claim_folder(path: Path, title: str = "", identity: str = "", *, force: bool
     return mark
 
 
+def reclaim_folder(path: Path, title: str = "", identity: str = "", *, force: bool = False) -> Mark:
+    """Mark a folder as a live run's that goes on with what is in it; its summary goes. Raises CaseError, EnvironmentProblem."""
+    mark = Mark(path)
+    try:
+        refuse_live_run(path, force=force)
+        mark.take({"title": title, "hash": identity}, force=force)
+        sweep(path)
+        (path / "summary.json").unlink(missing_ok=True)
+    except OSError as error:
+        mark.release()
+        raise cannot_write(error, error.filename or path) from error
+    return mark
+
+
 def write_atomic(path: Path, text: str) -> None:
-    """Replace a file as a whole: a reader sees the old text or the new, never a part. Raises OSError."""
+    """Replace a file as a whole: a reader sees the old text or the new, never a part, after a power cut neither. Raises
+    OSError.
+    """
     part = path.with_name(path.name + ".part")
     try:
         part.write_text(text, encoding="utf-8")
+        sync(part)
         os.replace(part, path)
     except OSError:
         with suppress(OSError):
@@ -191,6 +213,9 @@ def write_summary(
     **more: Any,
 ) -> None:
     """seconds: import, read, setup, solve, output, total; memory: per rank; iterations: newton, linear."""
+    for name in RUN_FILES:  # what the summary says is there has to be on the disk before it
+        if (folder / name).is_file():
+            sync(folder / name)
     if status not in STATUSES:
         raise ValueError(f"status {status!r} is none of {STATUSES}")
     summary = {

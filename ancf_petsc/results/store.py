@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ancf_petsc.errors import EnvironmentProblem, cannot_write
 from ancf_petsc.results.folder import unlocked
+from ancf_petsc.results.rollback import GoesOn, RawNumbers
 from ancf_petsc.results.space import DiskSpace, lengthen
 from ancf_petsc.results.xdmf import Dataset, Xdmf, link_name
 
@@ -70,14 +71,16 @@ class ResultStore:
         version: str = "",
         facts: Mapping[str, str] | None = None,
         parallel: bool | None = None,
+        goes_on: GoesOn | None = None,
     ) -> None:
         """facts: further attributes, on the root rank. parallel: write by all ranks (default: where this h5py
-        can) or through the root rank. Raises EnvironmentProblem.
+        can) or through the root rank. goes_on: with the file that is there. Raises EnvironmentProblem.
         """
         self.path = Path(folder) / "results.h5"
         self.comm = comm
         self.parallel = comm.size > 1 and (h5py.get_config().mpi if parallel is None else parallel)
-        self.steps = 0
+        self.steps = goes_on.steps if goes_on else 0
+        self.numbers = RawNumbers(goes_on.spans if goes_on else None)
         self._space = DiskSpace(self.path)
         self._held: list[h5py.h5d.DatasetID] = []  # of the open file, until all is written
         self._xdmf = Xdmf(self.path.with_suffix(".xdmf"), self.path.name)
@@ -93,6 +96,12 @@ class ResultStore:
         with self._agreed():
             if comm.rank == 0:
                 self._space.create()
+        self._goes_on = goes_on is not None
+        if self._goes_on:
+            with self._agreed(self._xdmf.path):
+                if comm.rank == 0:
+                    self._xdmf.go_on()
+            return
         with self._agreed(), unlocked():
             if self.parallel or comm.rank == 0:
                 h5py.h5f.create(os.fsencode(self.path), h5py.h5f.ACC_TRUNC, fapl=self._access).close()
@@ -123,6 +132,9 @@ class ResultStore:
 
         where = Dataset("/mesh/points", (self._nodes.total, 3))
         topology = Dataset("/mesh/cells", (self._cells.total, *np.shape(cells)[1:]), integer=True)
+        self._xdmf.set_mesh(kind, where, topology)
+        if self._goes_on:
+            return
         tables = [
             Share(where, np.ascontiguousarray(points, float), self._nodes),
             Share(topology, np.ascontiguousarray(cells, np.int64), self._cells),
@@ -140,7 +152,6 @@ class ResultStore:
                     file.create_group("/steps")
                     file["mesh"].attrs["kind"] = kind
             self._write(file, tables)
-        self._xdmf.set_mesh(kind, where, topology)
 
     def prepare_step(self, node_fields: Mapping[str, int], cell_fields: Mapping[str, int]) -> None:
         """Reserve the space of a step, given by names and numbers a row. Raises EnvironmentProblem, where there
@@ -214,6 +225,7 @@ class ResultStore:
             with self._agreed():  # while all objects are open: HDF5 reports no failure as one is closed
                 if file:
                     h5py.h5f.flush(file.id)
+                    self.numbers.note(self._held)
             self._held.clear()
             with self._agreed():
                 if file:

@@ -20,13 +20,17 @@ from ancf_petsc.errors import CaseError
 class CsvTable:
     """Writer of a CSV file; every row is on disk when `append` returns."""
 
-    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+    def __init__(self, path: Path, columns: Sequence[str], *, goes_on: bool = False) -> None:
+        """goes_on: with the rows that the file has. Raises OSError."""
         self.path = Path(path)
         self.columns = tuple(columns)
         if len(set(self.columns)) != len(self.columns):
             raise ValueError(f"{self.path}: a column is named twice: {self.columns}")
-        self._file = io.FileIO(self.path, "w")  # unbuffered: one line, one write
-        self._write(self.columns)
+        self._file = io.FileIO(self.path, "r+" if goes_on else "w")  # unbuffered: one line, one write
+        if goes_on:
+            self._file.seek(0, io.SEEK_END)
+        else:
+            self._write(self.columns)
 
     def append(self, row: Mapping[str, float] | Sequence[float]) -> None:
         """One row: values by column name, or in the order of the columns."""

@@ -13,6 +13,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +21,16 @@ from petsc4py import PETSc
 
 from ancf_petsc.errors import Interrupted, NoEquilibrium
 from ancf_petsc.parallel.exchange import combined
+from ancf_petsc.parallel.fields import field
+from ancf_petsc.solve.cause import cause_of
 from ancf_petsc.solve.critical import CLOSE, Watch
 from ancf_petsc.solve.cubic import crossing, cubic, extreme
-from ancf_petsc.solve.events import CriticalPoint, place_of
-from ancf_petsc.solve.load_path import LONGEST_FIRST_STEP, SAME_TIME, Marks, PathStep
+from ancf_petsc.solve.events import CriticalPoint, ended_at, place_of
+from ancf_petsc.solve.extrapolation import filled
+from ancf_petsc.solve.load_path import LONGEST_FIRST_STEP
+from ancf_petsc.solve.marks import SAME_TIME, Marks, PathStep
 from ancf_petsc.solve.newton import Newton
-from ancf_petsc.solve.stability import why_it_ends
+from ancf_petsc.solve.stability import Last, why_it_ends
 
 WANTED, MOST_ITERATIONS, MOST_STEPS = 4, 12, 5000
 STRAIGHT, SHARPEST = 0.95, 0.7
@@ -33,6 +38,7 @@ STRAIGHT, SHARPEST = 0.95, 0.7
 MOST_AT_LIMIT, LEVEL = 6, 1e-3
 """Trials for a limit point, and the rate of s over that at the ends of the step that is level enough."""
 ASTRAY = 'the path leads elsewhere; statics.control = "load" names its limit points'
+LOST = {"kind": "lost_definiteness"}
 EXACT = 1e-9
 """Reduction that iterative solvers are asked for."""
 log = logging.getLogger("ancf")
@@ -83,24 +89,52 @@ class ArcLength:
         self.on_bifurcation = on_bifurcation
         self.watch = Watch(newton)
         self.x, self.s = start or self.assembly.reference_vector(), 0.0
-        self._scale = 0.0
+        self._scale, self._steps = 0.0, 0
+        self._here: Point | None = None
         self._size = sqrt(2) * min(marks.after(0.0), LONGEST_FIRST_STEP)
 
     def run(self) -> None:
         """Raises NoEquilibrium where the path ends before s = 1, Interrupted when asked to stop."""
         try:
-            here = self._point(self.x.copy(), 0.0, None)
-            for _ in range(MOST_STEPS):
+            self._here = self._here or self._point(self.x.copy(), 0.0, None)
+            while self._steps < MOST_STEPS:
                 if self.interrupted():
                     raise Interrupted(f"stopped at pseudo-time {self.s:.6g}; everything up to here is saved")
-                here = self._advance(here)
+                self._here = self._advance(self._here)
+                self._steps += 1
                 if self.s == 1.0:
                     return
                 if self.s < -1.0:
-                    raise NoEquilibrium(f"the load factor fell to {self.s:.6g}: {ASTRAY}")
-            raise NoEquilibrium(f"{MOST_STEPS} steps by arc length did not lead to s = 1: {ASTRAY}")
+                    raise NoEquilibrium(f"the load factor fell to {self.s:.6g}: {ASTRAY}", LOST)
+            raise NoEquilibrium(f"{MOST_STEPS} steps by arc length did not lead to s = 1: {ASTRAY}", LOST)
         finally:
             self.watch.destroy()
+
+    def state(self) -> dict[str, Any]:
+        """All that the rest of the path hangs on, between two steps."""
+        here = self._here
+        assert here is not None
+        return {
+            "s": self.s,
+            "x": field(self.x),
+            "point": [field(here.x), here.s, field(here.direction), here.rate, here.length, here.negative],
+            "scale": self._scale,
+            "size": self._size,
+            "steps": self._steps,
+            "watch": self.watch.state(),
+            "newton": self.newton.state(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state. Collective."""
+        self.newton.restore(state["newton"])
+        x, s, direction, rate, length, negative = state["point"]
+        self._here = Point(filled(self.x, x), s, direction.ravel(), rate, length, negative)
+        self.x.array[:] = state["x"].ravel()
+        self.s, self._scale, self._size = state["s"], state["scale"], state["size"]
+        self._steps = state["steps"]
+        self.watch.restore(state["watch"])
+        self.newton.set_pseudo_time(self.s)
 
     # --- steps
 
@@ -115,10 +149,11 @@ class ArcLength:
                     break
                 reason = "the path turns too sharply in it"
             if self._size / 2 < self.smallest_step:
-                why = why_it_ends(self.newton, self.x, self.s, reason, self.smallest_step)
-                raise NoEquilibrium(why)
+                end = Last(self.s, self.x, reason, self.smallest_step, np.inf, (self.s, self.x))
+                raise why_it_ends(self.newton, self.watch, end)
             self._size /= 2
             log.info("  step by arc length failed (%s): halved to %.3g", reason, self._size)
+            self.newton.control.note("halved", reason, here.s, self._size)
         pieces = [(here, there, found)]
         if here.rate * there.rate < 0.0:
             pieces = self._at_limit(here, there, found)
@@ -183,8 +218,7 @@ class ArcLength:
         linear.ask_for(EXACT)
         linear.ksp.solve(rhs, answer)
         if linear.gave_up():
-            log.info("  the tangent is not positive definite: factoring from now on")
-            linear.fall_back_to_direct()
+            self.newton.factor_from_now_on(self.s)
             self.newton.tangent_at(x)
             linear.ksp.solve(rhs, answer)
         values = answer.array_r.copy()
@@ -252,13 +286,13 @@ class ArcLength:
         stop = self.on_bifurcation == "stop"
         done = "the path ends here, as statics.on_bifurcation asks" if stop else "the path goes straight on"
         place = place_of(self.assembly, self.watch.lowest.mode)
-        event = CriticalPoint(
-            "bifurcation", (here.s + there.s) / 2, (here.s, there.s), there.negative, *place, done
-        )
+        cause = cause_of(self.assembly, here.x, self.watch.lowest.mode)
+        middle, between = (here.s + there.s) / 2, (here.s, there.s)
+        event = CriticalPoint("bifurcation", middle, between, there.negative, *place, done, cause.kind)
         self.newton.set_pseudo_time(here.s)
         self.on_event(event, here.x)
         if stop:
-            raise NoEquilibrium(event.words())
+            raise ended_at(event, cause)
 
     def _outputs_between(self, here: Point, there: Point) -> None:
         """Equilibria at exactly the outputs' pseudo-times between two points, in the order of the path."""

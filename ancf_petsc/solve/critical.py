@@ -8,6 +8,7 @@ state itself.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from petsc4py import PETSc
 
@@ -51,6 +52,23 @@ class Watch:
         """Free PETSc's objects."""
         self.lowest.destroy()
 
+    def state(self) -> dict[str, Any]:
+        """What was seen so far."""
+        return {
+            "lowest": self.lowest.state(),
+            "history": [list(seen) for seen in self.history],
+            "negative": self.negative,
+            "first": self._first,
+            "since": [self._spent, self._passed],
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state."""
+        self.lowest.restore(state["lowest"])
+        self.history = [(s, value) for s, value in state["history"]]
+        self.negative, self._first = state["negative"], state["first"]
+        self._spent, self._passed = state["since"]
+
     @property
     def stable(self) -> bool:
         """Whether the last state looked at was."""
@@ -59,11 +77,12 @@ class Watch:
     @property
     def share(self) -> float:
         """The last lowest eigenvalue over the largest so far."""
-        largest = self._largest
+        largest = self.largest
         return self.history[-1][1] / largest if self.history and largest > 0.0 else 1.0
 
     @property
-    def _largest(self) -> float:
+    def largest(self) -> float:
+        """The largest lowest eigenvalue so far."""
         return max((value for _, value in self.history), default=0.0)
 
     def begin(self, s: float) -> bool:
@@ -112,7 +131,7 @@ class Watch:
         """Negative pivots of the tangent held, its lowest eigenvalue being `value`; None where nobody can count them.
         None are counted where all of them are 0 but for rounding.
         """
-        if abs(value) <= NEUTRAL * self._largest:
+        if abs(value) <= NEUTRAL * self.largest:
             return 0
         pivots = self.newton.linear.negative_pivots()
         if pivots is None and value > 0.0:
@@ -132,7 +151,7 @@ class Watch:
         """
         lowest = self.lowest
         lowest.restart()
-        self.newton.tangent_at(x, SHIFT * self._largest * lowest.scale)
+        self.newton.tangent_at(x, SHIFT * self.largest * lowest.scale)
         lowest.look(CLOSE)
 
     def locate(self, before: Known, after: Known) -> tuple[Known, Known, float]:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
+
+from ancf_petsc.parallel.fields import field
 
 FEWEST, MOST = 3, 6
 """Conditions, states and slope, of a polynomial: fewer predict worse than the tangent, more repeat Newton's errors."""
@@ -42,6 +46,17 @@ class Extrapolation:
             state.destroy()
         self._states = []
 
+    def state(self) -> dict[str, Any]:
+        """What is remembered."""
+        slope = None if self._slope is None else field(self._slope)
+        return {"states": [[s, field(x)] for s, x in self._states], "slope": slope}
+
+    def restore(self, state: dict[str, Any], like: PETSc.Vec) -> None:
+        """Remember what `state` says; like: a vector of the body."""
+        self.forget()
+        self._states = [(s, filled(like, rows)) for s, rows in state["states"]]
+        self._slope = None if state["slope"] is None else filled(like, state["slope"])
+
     def at(self, target: float) -> PETSc.Vec | None:
         """The state at `target`; None as long as too little is known."""
         if len(self._states) + (self._slope is not None) < FEWEST:
@@ -61,6 +76,13 @@ class Extrapolation:
         if self._slope is not None:
             self._slope.destroy()
         self._slope = None
+
+
+def filled(like: PETSc.Vec, rows: NDArray) -> PETSc.Vec:
+    """A new vector of rows (n, 3)."""
+    vector = like.duplicate()
+    vector.array[:] = rows.ravel()
+    return vector
 
 
 def weights_at(target: float, times: list[float], *, with_slope: bool) -> tuple[NDArray[np.float64], float]:

@@ -34,6 +34,15 @@ class Forcing:
         found = max(residual - eta * before, 0.0) / before**2
         self._curvature = min(max(found, 0.3 * self._curvature, 1.0), 1e6)
 
+    @property
+    def curvature(self) -> float:
+        """C, as it is known so far."""
+        return self._curvature
+
+    @curvature.setter
+    def curvature(self, value: float) -> None:
+        self._curvature = value
+
     def term(self, residual: float) -> float:
         """The reduction to ask for at an out-of-balance force `residual`."""
         wanted = max(SHARE * self._curvature * residual, AIM * self.tolerance / residual)

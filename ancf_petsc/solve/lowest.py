@@ -8,10 +8,13 @@ preconditioner is that of the last linear solve; where the tangent was factored 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ancf_petsc.parallel.exchange import combined
+from ancf_petsc.parallel.fields import field
 from ancf_petsc.solve.newton import Newton
 
 SETTLED = 1e-3
@@ -30,7 +33,7 @@ class LowestMode:
         self.value = np.inf
         self._free = (self.assembly.model.drive[: self.assembly.model.owned] < 0).ravel()
         self._mode = self._start()
-        self._scale = np.zeros(0)
+        self._scale, self._known = np.zeros(0), False
         self._in, self._out = self.assembly.vector(), self.assembly.vector()
 
     def destroy(self) -> None:
@@ -47,14 +50,29 @@ class LowestMode:
     def mode(self) -> NDArray[np.float64]:
         return self._mode.reshape(-1, 3)
 
+    def state(self) -> dict[str, Any]:
+        """What the next look begins with."""
+        scale = self._scale if self._known else np.zeros_like(self._mode)
+        return {
+            "value": self.value,
+            "mode": field(self._mode),
+            "scale": field(scale),
+            "known": self._known,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state."""
+        self.value, self._mode = state["value"], state["mode"].ravel()
+        self._scale, self._known = state["scale"].ravel(), state["known"]
+
     def restart(self) -> None:
         """Forget the mode: of equal eigenvalues the next look finds the same one, whatever was looked at before."""
         self._mode = self._start()
 
     def look(self, iterations: int) -> float:
         """The lowest eigenvalue of the tangent that the linear solver holds, after as many iterations at most."""
-        if not len(self._scale):
-            self._scale = self._diagonal()
+        if not self._known:
+            self._scale, self._known = self._diagonal(), True
         if not self._dot(self._mode):
             return np.inf
         vectors = self._mode[None]

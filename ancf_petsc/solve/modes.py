@@ -13,6 +13,7 @@ from ancf_petsc.errors import AncfError
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.mass import Mass
 from ancf_petsc.model.matrix import Matrix
+from ancf_petsc.solve.petsc import direct_package
 
 TOLERANCE = 1e-10
 
@@ -84,7 +85,7 @@ def _solver(stiffness: Matrix, inertia: Matrix, count: int, shift: float) -> SLE
     ksp = transform.getKSP()
     ksp.setType(PETSc.KSP.Type.PREONLY)
     ksp.getPC().setType(PETSc.PC.Type.CHOLESKY)
-    ksp.getPC().setFactorSolverType("mumps")
+    ksp.getPC().setFactorSolverType(direct_package("modes_st_"))
     solver.setFromOptions()
     return solver
 

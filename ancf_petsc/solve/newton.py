@@ -6,7 +6,9 @@ shorter one. Such a state is never accepted. Convergence: |R| <= tolerance x max
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +18,17 @@ from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.forcing import Forcing
 from ancf_petsc.solve.linear.solver import LinearSolver
-from ancf_petsc.solve.petsc import default_options, is_given
+from ancf_petsc.solve.petsc import NOT_FINITE, default_options, is_given, keep_preconditioner
+from ancf_petsc.solve.step_control import StepControl
 
+log = logging.getLogger("ancf")
 MOST_ITERATIONS = 25
 QUICK, CAREFUL = "basic", "bt"
 """PETSc's line searches: whole steps of Newton's method; those cut back to where the out-of-balance force falls."""
 PREDICTOR_TERM = 1e-8  # the path's slope is made of it, and extrapolated from
 Reason = PETSc.SNES.ConvergedReason
 WORDS = {
-    Reason.DIVERGED_FNORM_NAN: "a state with det F <= 0 or forces that are not finite was met",
+    NOT_FINITE: "a state with det F <= 0 or forces that are not finite was met",
     Reason.DIVERGED_MAX_IT: f"no convergence in {MOST_ITERATIONS} iterations",
     Reason.DIVERGED_LINE_SEARCH: "no step along Newton's direction lowers the out-of-balance force",
     Reason.DIVERGED_LINEAR_SOLVE: "the linear solver failed",
@@ -43,12 +47,15 @@ class Outcome:
 
 
 class Newton:
-    """Solves Q(x) = Q_e(s) for the free degrees of freedom, the driven ones being in place."""
+    """Solves Q(x) = Q_e(s) for the free degrees of freedom, the driven ones being in place. control: what was changed on the
+    way.
+    """
 
     def __init__(self, assembly: Assembly, tolerance: float) -> None:
         self.assembly = assembly
         self.comm = assembly.comm
         self.tolerance = tolerance
+        self.control = StepControl()
         self.matrix = assembly.create_matrix()
         self._external = assembly.external_force(0.0)
         self._residuals: list[float] = []
@@ -58,11 +65,12 @@ class Newton:
         self._snes, self._careful = self._create(), self._create()
         self._careful.setKSP(self._snes.getKSP())
         self.linear = LinearSolver(assembly, self.matrix, self._snes.getKSP())
-        # Preconditioners are renewed by hand, after each tangent: SNES itself does it the first time only.
+        # Preconditioners are renewed by hand, after each tangent, never by SNES.
         for snes, search in ((self._careful, CAREFUL), (self._snes, QUICK)):
             snes.setJacobian(self._tangent, self.linear.operator, self.matrix.mat)
-            with default_options({"snes_lag_preconditioner": -2, "snes_linesearch_type": search}):
+            with default_options({"snes_linesearch_type": search}):
                 snes.setFromOptions()
+            keep_preconditioner(snes)
         self.linear.read_options()
         self._predicting = 0
         self._forcing = Forcing(tolerance)
@@ -91,6 +99,13 @@ class Newton:
         self.linear.ksp.setUp()
         x.destroy()
 
+    def factor_from_now_on(self, s: float, why: str = "the tangent is not positive definite") -> None:
+        """Leave iterative linear solvers, at pseudo-time s."""
+        if not self.linear.direct:
+            log.info("  %s: factoring from now on", why)
+            self.control.note("factored", why, s)
+        self.linear.fall_back_to_direct()
+
     def set_pseudo_time(self, s: float) -> None:
         """Loads as they are at s."""
         self._external = self.assembly.external_force(s)
@@ -115,6 +130,30 @@ class Newton:
             linear=before + snes.getLinearSolveIterations(),
             residuals=tuple(self._residuals),
         )
+
+    def state(self) -> dict[str, Any]:
+        """What is carried from one solve to the next."""
+        return {
+            "curvature": self._forcing.curvature,
+            "term": self._term,
+            "largest_diagonal": self.matrix.largest_diagonal,
+            "linear": self.linear.state(),
+            "control": self.control.state(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state. Collective."""
+        x = self.assembly.vector()
+
+        def make(at: NDArray, shift: NDArray) -> None:
+            x.array[:] = at.ravel()
+            self.tangent_at(x, shift.ravel())
+
+        self.linear.restore(state["linear"], make)
+        x.destroy()
+        self.control.restore(state["control"])
+        self._forcing.curvature, self._term = state["curvature"], state["term"]
+        self.matrix.largest_diagonal = state["largest_diagonal"]
 
     def predict(self, x: PETSc.Vec, s: float, target: float) -> bool:
         """Move x from equilibrium at s by the tangent to `target`. Returns whether the linear solve succeeded."""
@@ -160,7 +199,7 @@ class Newton:
         """
         values = self.assembly.vector()
         self._residual(self._snes, x, values)
-        scale, norm = self._force_scale(), values.norm()
+        scale, norm = self.force_scale(), values.norm()
         found = values.array_r.copy()
         values.destroy()
         return found, norm / scale if scale else 0.0
@@ -187,14 +226,14 @@ class Newton:
             self.matrix.add_diagonal(self._shift)
         self.assembly.add_tangent(x, self.matrix)
         self.matrix.finish()
-        self.linear.renew_if_tired(x)
+        self.linear.renew_if_tired(x, self._shift)
         self.linear.ask_for(self._term)
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         residual = norms[2]
         if not np.isfinite(residual):
-            return Reason.DIVERGED_FNORM_NAN
-        scale = self._force_scale()
+            return NOT_FINITE
+        scale = self.force_scale()
         relative = residual / scale if scale else 0.0
         if iteration:
             self.linear.note_effort(self.linear.ksp.getIterationNumber(), self._term)
@@ -205,8 +244,10 @@ class Newton:
         self._term = self._forcing.term(relative)
         return Reason.ITERATING
 
-    def _force_scale(self) -> float:
-        """The largest of the norms of reactions and loads, and what rounding leaves of the tangent times the size."""
+    def force_scale(self) -> float:
+        """The largest of the norms of reactions and loads, and what rounding leaves of the tangent times the size; of the state
+        that forces were taken at last. Collective.
+        """
         reactions, loads = np.sqrt(combined(self.comm, np.array(self._supported)))
         floor = 1e-14 * self.matrix.largest_diagonal * self.assembly.model.size
         return max(reactions, loads, floor / self.tolerance)

@@ -16,11 +16,12 @@ from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import petsc4py
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ancf_petsc.errors import CaseError
+from ancf_petsc.errors import CaseError, EnvironmentProblem
 from ancf_petsc.launcher import is_general_option
 
 PREFIX = re.compile(
@@ -28,6 +29,9 @@ PREFIX = re.compile(
     r"|fieldsplit_[a-z0-9]+_|st_|smoother_)"
 )
 NUMBER = re.compile(r"\d+")
+_REASONS = PETSc.SNES.ConvergedReason
+NOT_FINITE: int = getattr(_REASONS, "DIVERGED_FUNCTION_NANORINF", None) or _REASONS.DIVERGED_FNORM_NAN
+"""SNES's reason for a state whose residual is not a number; it has the first name from PETSc 3.25 on."""
 READ_LATE = re.compile(r"view|reason|monitor|draw|plot|mat_|test|check")  # during the solution or after it
 log = logging.getLogger("ancf")
 
@@ -37,7 +41,13 @@ def petsc_options(given: Mapping[str, object]) -> Iterator[GivenOptions]:
     """Put options into PETSc's database for the time of one run. Collective.
 
     PETSc's general options, such as -log_view and -options_left, stay: it reads them at the end of the process.
+    Raises EnvironmentProblem where PETSc computes with other numbers than this program.
     """
+    if np.dtype(PETSc.ScalarType) != np.float64:
+        raise EnvironmentProblem(
+            f"{PETSc.__file__}: this PETSc computes with {np.dtype(PETSc.ScalarType)}; one with real numbers of "
+            "double precision (float64) is needed: set PETSC_DIR and PETSC_ARCH to such a build, or install another"
+        )
     database = PETSc.Options()
     for name, value in given.items():
         database.setValue(name, _text(value))
@@ -124,6 +134,42 @@ def refuse_wrong_values(given: Mapping[str, object]) -> Iterator[None]:
         raise CaseError(
             f"PETSc refuses an option: {said}", key="petsc", got=values, cure="correct or drop it"
         ) from error
+
+
+def has_package(name: str) -> bool:
+    """Whether PETSc was built with a library."""
+    return bool(PETSc.Sys.hasExternalPackage(name))
+
+
+def direct_package(prefix: str = "") -> str:
+    """The package that factors: MUMPS, unless an option with this prefix chooses another. Raises EnvironmentProblem
+    where PETSc was built without it.
+    """
+    if not (has_package("mumps") or is_given(f"{prefix}pc_factor_mat_solver_type")):
+        raise EnvironmentProblem(
+            f"{PETSc.__file__}: this PETSc was built without MUMPS, which factors small and indefinite tangents: "
+            "install one that has it (Debian's, conda-forge's, or PETSC_CONFIGURE_OPTIONS=--download-mumps for PyPI's), "
+            "or choose another solver, as in: -- -ksp_type cg -pc_type gamg"
+        )
+    return "mumps"
+
+
+def keep_preconditioner(snes: PETSc.SNES) -> None:
+    """Let SNES never make its preconditioner anew, unless an option speaks of it: petsc4py has no binding, PETSc's library does,
+    and its option refuses to say so from the start.
+    """
+    if not is_given("snes_lag_preconditioner"):
+        library = ctypes.CDLL(PETSc.__file__)
+        number = ctypes.c_int64 if np.dtype(PETSc.IntType).itemsize == 8 else ctypes.c_int32
+        library.SNESSetLagPreconditioner(ctypes.c_void_p(snes.handle), number(-1))
+
+
+def free_what_python_dropped(comm: MPI.Comm) -> None:
+    """Free PETSc's objects that nothing in Python refers to any more: petsc4py only lists them, as ranks drop them at different
+    times. Collective.
+    """
+    if hasattr(PETSc, "garbage_cleanup"):  # from 3.18 on
+        PETSc.garbage_cleanup(comm)
 
 
 def is_given(name: str) -> bool:

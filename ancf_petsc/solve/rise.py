@@ -10,7 +10,8 @@ from petsc4py import PETSc
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.model import Model
 from ancf_petsc.model.ramp import Ramp
-from ancf_petsc.solve.load_path import LoadPath, Marks, PathStep
+from ancf_petsc.solve.load_path import LoadPath
+from ancf_petsc.solve.marks import Marks, PathStep
 from ancf_petsc.solve.newton import Newton
 
 
@@ -43,11 +44,13 @@ class Rise:
         outputs: Sequence[float],
         smallest_step: float,
         on_step: Callable[[PathStep, PETSc.Vec], None] = lambda step, x: None,
+        begin: Callable[[LoadPath], None] = lambda path: None,
         **more,
     ) -> PETSc.Vec:
-        """The state at its end. Raises NoEquilibrium. Collective."""
+        """The state at its end. begin: sees the path before its first step. Raises NoEquilibrium. Collective."""
         path = LoadPath(self.newton, Marks.of(outputs, ()), smallest_step, on_step, **more)
         try:
+            begin(path)
             path.run()
         finally:
             self.newton.destroy()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 
@@ -15,7 +15,7 @@ class Clock:
     def __init__(self, imports: float = 0.0) -> None:
         self.seconds = dict.fromkeys(self.PARTS, 0.0)
         self.seconds["import"] = imports
-        self._begun = time.perf_counter()
+        self._begun, self._before = time.perf_counter(), imports
         self._inner = [0.0]
 
     @contextmanager
@@ -30,6 +30,12 @@ class Clock:
             self.seconds[name] += spent - self._inner.pop()
             self._inner[-1] += spent
 
+    def add(self, earlier: Mapping[str, float]) -> None:
+        """Count the seconds that `report` gave of earlier parts of the run too."""
+        for name in self.PARTS:
+            self.seconds[name] += earlier[name]
+        self._before += earlier["total"]
+
     def report(self) -> dict[str, float]:
         """Seconds by part, and in total, imports included."""
-        return {**self.seconds, "total": self.seconds["import"] + time.perf_counter() - self._begun}
+        return {**self.seconds, "total": self._before + time.perf_counter() - self._begun}

@@ -1,4 +1,6 @@
-"""A polite end: SIGINT and SIGTERM are noted, and the run stops after the step it is in."""
+"""A polite end: SIGINT, SIGTERM and SIGUSR1 (of batch systems, before the time is over) are noted, and the run stops after the
+step it is in.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ class StopRequest:
     @contextmanager
     def watched(self) -> Iterator[None]:
         """Note signals during a block. Outside the main thread there is nothing to note."""
-        names = (signal.SIGINT, signal.SIGTERM)
+        names = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
         try:
             before = [signal.signal(name, self._note) for name in names]
         except ValueError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import re
 from importlib.metadata import PackageNotFoundError, version
 
 
@@ -12,6 +13,12 @@ def program_version() -> str:
         return version("ancf_petsc")
     except PackageNotFoundError:
         return "unknown"
+
+
+def mpi_version(said: str) -> str:
+    """Name and version in what an MPI library says of itself: Open MPI a sentence, MPICH a table."""
+    first = re.split(r"[,\n\x00]", said.strip())[0]
+    return " ".join(first.replace("Version:", "").split())
 
 
 def versions() -> dict[str, str]:
@@ -26,7 +33,7 @@ def versions() -> dict[str, str]:
         "ancf_petsc": program_version(),
         "python": platform.python_version(),
         "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
-        "mpi": MPI.Get_library_version().split(",")[0].split("\n")[0].strip("\x00"),
+        "mpi": mpi_version(MPI.Get_library_version()),
         "numpy": numpy.__version__,
         "numba": numba.__version__,
         "h5py": h5py.__version__,

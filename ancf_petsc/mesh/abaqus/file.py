@@ -168,7 +168,8 @@ def _blocks(instance: Instance, key: str, offsets: Offsets, notes: list[str]) ->
         blocks.append(Block(shape.kind, elements.numbers + by["element"][key], nodes + by["node"][key]))
         if elements.type.family == AXISYMMETRIC:
             notes.append(
-                f"{len(numbers)} {elements.title} elements are axisymmetric in the deck: read as a plane body"
+                f"{len(numbers)} {elements.title} elements are axisymmetric in the deck: "
+                '[section] plane = "axisymmetric" computes them so'
             )
         if elements.type.family == SKIN:
             notes.append(

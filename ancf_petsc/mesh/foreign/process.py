@@ -12,9 +12,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-import ancf_petsc
 from ancf_petsc.errors import EnvironmentProblem
-from ancf_petsc.launcher import OF_A_LAUNCHER
 from ancf_petsc.mesh.foreign import child, wire
 from ancf_petsc.mesh.raw import mesh_error
 
@@ -99,15 +97,13 @@ def start(words: list[str], home: str) -> tuple[Any, int]:
 
     home: an empty folder; what libraries keep for their user goes there.
     """
-    place = os.fspath(Path(ancf_petsc.__file__).parent.parent)
+    place = os.fspath(Path(__file__).parents[3])
     code = (
         f"import sys; sys.path.append({place!r}); "
         "from ancf_petsc.mesh.foreign import child; child.main(sys.argv[1:])"
     )
     # A library built with MPI must not take itself for a rank of this run.
-    environment = {
-        k: v for k, v in os.environ.items() if not k.startswith((*OF_A_LAUNCHER, "OMPI_", "PMI", "MPI_"))
-    }
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMI", "MPI_"))}
     environment |= {"HOME": home, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     read, write = os.pipe()
     try:

@@ -58,7 +58,7 @@ class Card:
         return self.line.error(f"{self.name}: {problem}", **facts)
 
 
-class Deck(NamedTuple):
+class BulkData(NamedTuple):
     """What is known while a deck is read. folder: of its main file; notes, comments: gathered from all of its files."""
 
     folder: Path
@@ -70,12 +70,12 @@ class Deck(NamedTuple):
 def read_bulk(path: Path, notes: list[str]) -> tuple[list[Card], list[str]]:
     """Cards of the bulk data, and the comments of the file. Raises MeshError with file and line."""
     comments: list[str] = []
-    deck = Deck(path.parent, notes, comments, DeckFiles())
+    deck = BulkData(path.parent, notes, comments, DeckFiles())
     lines = list(_bulk(list(_lines(path, deck, (os.path.realpath(path),)))))
     return list(_cards(lines)), comments
 
 
-def _lines(path: Path, deck: Deck, above: tuple[str, ...]) -> Iterator[Line]:
+def _lines(path: Path, deck: BulkData, above: tuple[str, ...]) -> Iterator[Line]:
     """The lines of a file and of those it includes, comments and empty lines left out."""
     data = deck.files.read(path)
     pending: Line | None = None
@@ -99,7 +99,7 @@ def _lines(path: Path, deck: Deck, above: tuple[str, ...]) -> Iterator[Line]:
         raise pending.error("INCLUDE: the name of the file has no end", cure="close the quotes")
 
 
-def _included(line: Line, deck: Deck, above: tuple[str, ...]) -> Iterator[Line]:
+def _included(line: Line, deck: BulkData, above: tuple[str, ...]) -> Iterator[Line]:
     found = INCLUDE.match(line.text)
     name = found[1].strip() if found else ""
     for folder in (line.path.parent, deck.folder):

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from ancf_petsc.errors import MotionStopped
 from ancf_petsc.input.methods import METHODS
 from ancf_petsc.motion.compiled import CompiledMotion, compiled_motion
 from ancf_petsc.motion.equations import Equations
+from ancf_petsc.parallel.fields import field
 
 SHORTEST = 1e-13  # of the duration: a step so short does not move the clock reliably
 TINY = 0.9e-9  # of the usual step: increments so small are rounding, and velocities made of them are wrong
@@ -120,6 +122,25 @@ class Integrator(ABC):
     @abstractmethod
     def advance(self, goal: float) -> Step:
         """One step: to `goal`, or, where the method leaps, at most to `goal`. Raises MotionStopped."""
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether `state` says all."""
+        return True
+
+    def state(self) -> dict[str, Any]:
+        """All that the rest of the motion hangs on, between two steps."""
+        return {
+            "time": self.time,
+            "x": field(self.x),
+            "v": field(self.v),
+            "piece": self.equations.piece,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a state. Collective."""
+        self.time, self.equations.piece = state["time"], state["piece"]
+        self.x.array[:], self.v.array[:] = state["x"].ravel(), state["v"].ravel()
 
     def restart(self) -> None:
         """Forget what was before: the velocity jumped. The state has been set."""

@@ -10,11 +10,14 @@ positions between ranks for each and those of the mass solve.
 
 from __future__ import annotations
 
+from typing import Any
+
 from petsc4py import PETSc
 
 from ancf_petsc.motion.compiled import CompiledMotion
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.integrators.base import Integrator, Settings, Step, steps_in
+from ancf_petsc.parallel.fields import field
 
 
 class CentralDifference(Integrator):
@@ -46,6 +49,16 @@ class CentralDifference(Integrator):
         if not self._begun:
             self.restart()
         return self._step(goal) if self.compiled is None else self._leap(goal, self.compiled)
+
+    def state(self) -> dict[str, Any]:
+        a = self.a if self._begun else self.x.array_r
+        return {**super().state(), "a": field(a), "begun": self._begun}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        super().restore(state)
+        self._begun = state["begun"]
+        if self._begun:
+            self.a = state["a"].copy()
 
     def restart(self) -> None:
         v = self.v.array_r.reshape(-1, 3)

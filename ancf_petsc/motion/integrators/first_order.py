@@ -6,11 +6,15 @@ the stage stand in their place, so every method keeps its order.
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.integrators.base import Integrator, Settings, Step
+from ancf_petsc.parallel.fields import Field, field
 
 NOT_FINITE = 72  # PETSC_ERR_FP
 SPEED_CHANGE = 1.1  # a largest speed grown by this factor widens the tolerance of velocities
@@ -71,6 +75,26 @@ class FirstOrder(Integrator):
         self._propose(size, now - before)
         return self._report(now - before)
 
+    def state(self) -> dict[str, Any]:
+        return {
+            **super().state(),
+            "y": self._halves(self.y.array_r),
+            "speed": self._speed,
+            "proposed": self._proposed,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        super().restore(state)
+        self.y.array[:] = joined(state["y"])
+        self._speed, self._proposed = state["speed"], state["proposed"]
+        if self.adaptive:
+            self._set_tolerances()
+        self.ts.setTime(self.time)
+
+    def _halves(self, y: NDArray) -> list[Field]:
+        """Of a vector as y: the positions' and the velocities'."""
+        return [field(y[: self._own]), field(y[self._own :])]
+
     def restart(self) -> None:
         self._load()
         super().restart()
@@ -107,13 +131,26 @@ class FirstOrder(Integrator):
         speed = max(self.v.norm(PETSc.NormType.INFINITY), size / self.equations.duration)
         if speed > SPEED_CHANGE * self._speed:
             self._speed = speed
-            weights = self.y.duplicate()
-            weights.array[: self._own] = self.settings.tolerance * size
-            weights.array[self._own :] = self.settings.tolerance * speed
-            self.ts.setTolerances(rtol=0.0, atol=weights)
+            self._set_tolerances()
+
+    def _set_tolerances(self) -> None:
+        weights = self.y.duplicate()
+        weights.array[: self._own] = self.settings.tolerance * self.equations.assembly.model.size
+        weights.array[self._own :] = self.settings.tolerance * self._speed
+        self.ts.setTolerances(rtol=0.0, atol=weights)
+        weights.destroy()
+
+    def _counted(self) -> tuple[int, int, int]:
+        """PETSc's counts so far: Newton's and linear iterations, rejected steps."""
+        return self.ts.getSNESIterations(), self.ts.getKSPIterations(), self.ts.getStepRejections()
 
     def _report(self, size: float) -> Step:
-        counts = (self.ts.getSNESIterations(), self.ts.getKSPIterations(), self.ts.getStepRejections())
+        counts = self._counted()
         newton, linear, rejected = (now - then for now, then in zip(counts, self._counts, strict=True))
         self._counts = counts
         return Step(self.time, size, newton, linear, rejected)
+
+
+def joined(halves: list[NDArray]) -> NDArray:
+    """A vector as y of its halves (n, 3)."""
+    return np.concatenate([half.ravel() for half in halves])

@@ -9,6 +9,8 @@ PETSc's solvers.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -20,6 +22,7 @@ from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.increment import Forces
 from ancf_petsc.motion.integrators.base import Integrator, Settings, Step, steps_in
 from ancf_petsc.motion.integrators.one_step import OneStep
+from ancf_petsc.parallel.fields import field
 
 
 class GeneralizedAlpha(OneStep):
@@ -49,6 +52,16 @@ class GeneralizedAlpha(OneStep):
 
     def advance(self, goal: float) -> Step:
         return super().advance(goal) if self._newton is None else self._leap(goal, self._newton)
+
+    def state(self) -> dict[str, Any]:
+        aged = self._newton.aged if self._newton is not None else None
+        return {**super().state(), "a": field(self.a), "factor_aged": aged}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        super().restore(state)
+        self.a = state["a"].copy()
+        if self._newton is not None and state["factor_aged"] is not None:
+            self._newton.restore(aged=state["factor_aged"])
 
     def restart(self) -> None:
         self.a = self.equations.acceleration(self.time, self.x, self.v.array_r.reshape(-1, 3))

@@ -7,6 +7,7 @@ system of the size of statics, K + shift (shift + alpha) M, which the linear sol
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from ancf_petsc.motion.increment import MOST_ITERATIONS, ForceTest
 from ancf_petsc.motion.integrators.base import Settings
 from ancf_petsc.motion.integrators.first_order import FirstOrder
 from ancf_petsc.parallel.exchange import combined
+from ancf_petsc.parallel.fields import field
 from ancf_petsc.solve.linear.solver import LinearSolver
 from ancf_petsc.solve.petsc import default_options
 
@@ -25,16 +27,18 @@ SAME_SHIFT = 1e-9  # relative: equal steps differ by rounding
 
 class ImplicitFirstOrder(FirstOrder):
     """A subclass names PETSc's type and its options. keeps_matrix: whether Newton mends what an old matrix
-    does badly.
+    does badly. solves: False while steps are to leave the solution as it is.
     """
 
     type_name: str
     keeps_matrix = True
+    solves = True
     relative = 1e-9
 
     def __init__(self, equations: Equations, settings: Settings, x: PETSc.Vec, v: PETSc.Vec) -> None:
         super().__init__(equations, settings, x, v)
         self.matrix = equations.assembly.create_matrix()
+        self._made: NDArray | None = None  # positions that the matrix was made at
         self._eliminated = _Eliminated(self)
         self.jacobian = PETSc.Mat().createPython(
             (self.y.getSizes(),) * 2, self._eliminated, comm=equations.comm
@@ -77,7 +81,23 @@ class ImplicitFirstOrder(FirstOrder):
         for item in (self._eliminated.linear, self.jacobian, self._eliminated.ksp, self.matrix):
             item.destroy()
 
+    def state(self) -> dict[str, Any]:
+        made = None if self._made is None else field(self._made)
+        return {**super().state(), "aged": self.test.aged, "shift": self._eliminated.shift, "made": made}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        super().restore(state)
+        if state["made"] is not None and self.keeps_matrix:
+            x = self.equations.assembly.vector()
+            x.array[:] = state["made"].ravel()
+            self._fill_at(x, state["shift"])
+            x.destroy()
+        self.test.aged = state["aged"]
+
     def _function(self, ts: PETSc.TS, t: float, y: PETSc.Vec, rate: PETSc.Vec, f: PETSc.Vec) -> None:
+        if not self.solves:
+            f.set(0.0)
+            return
         equations, n = self.equations, self._own
         x, v = self.stage(y, t)
         given = rate.array_r[n:].reshape(-1, 3) + equations.damping * v
@@ -100,7 +120,10 @@ class ImplicitFirstOrder(FirstOrder):
         P.stateIncrease()
 
     def _fill(self, y: PETSc.Vec, t: float, shift: float) -> None:
-        x, _ = self.stage(y, t)
+        self._fill_at(self.stage(y, t)[0], shift)
+
+    def _fill_at(self, x: PETSc.Vec, shift: float) -> None:
+        self._made = x.array_r.copy()
         self._eliminated.shift = shift
         self.matrix.clear()
         self.equations.assembly.add_tangent(x, self.matrix)
@@ -111,6 +134,8 @@ class ImplicitFirstOrder(FirstOrder):
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         """By the forces alone: after the first iteration x' = v holds to rounding."""
+        if not self.solves:
+            return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
         values = snes.getFunction()[0].array_r[self._own :]
         if iteration == 0:
             self.test.begin()

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,10 +36,10 @@ class OneStep(Integrator):
 
     def __init__(self, equations: Equations, settings: Settings, x: PETSc.Vec, v: PETSc.Vec) -> None:
         super().__init__(equations, settings, x, v)
-        self.h = self.goal = 0.0
+        self.h = self.goal = self._made_with = 0.0
         self._between = equations.assembly.vector()
         self.solver = IncrementSolver(
-            equations, x, self.forces, self.tangent, symmetric=self.symmetric, relative=self.relative
+            equations, x, self.forces, self._add_tangent, symmetric=self.symmetric, relative=self.relative
         )
         self.ts.createPython(_Context(self._step), comm=equations.comm)
         self.ts.setMaxTime(1e300)
@@ -77,6 +78,15 @@ class OneStep(Integrator):
         self.time = goal
         return Step(goal, self.h, self.solver.newton, self.solver.linear_iterations, known=self._known)
 
+    def state(self) -> dict[str, Any]:
+        sizes = [self._size, self._made_with]
+        return {**super().state(), "sizes": sizes, "solver": self.solver.state()}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        super().restore(state)
+        self._size, self.h = state["sizes"]
+        self.solver.restore(state["solver"])
+
     def set_solver_up(self) -> None:
         self.h = self.goal = self.settings.step
         self.solver.set_up()
@@ -103,6 +113,10 @@ class OneStep(Integrator):
         inertia, loads = eq.mass.times(carried), eq.loads(t)
         internal, _ = eq.assembly.internal_force(self.between(d, part))
         return inertia + internal - loads, self.squared(inertia, internal, loads)
+
+    def _add_tangent(self, d: PETSc.Vec, matrix: Matrix) -> None:
+        self._made_with = self.h  # equal steps differ by rounding
+        self.tangent(d, matrix)
 
     def between(self, d: PETSc.Vec, part: float) -> PETSc.Vec:
         """The state x + part d."""

@@ -5,6 +5,9 @@ enough and no option speaks of TS; it is PETSc's pair with PETSc's control.
 
 from __future__ import annotations
 
+from typing import Any
+
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.kernel.adaptive import NOT_FINITE, TOO_SHORT
@@ -12,7 +15,7 @@ from ancf_petsc.kernel.explicit import EXPLICIT
 from ancf_petsc.motion.compiled import CompiledMotion
 from ancf_petsc.motion.equations import Equations
 from ancf_petsc.motion.integrators.base import Settings, Step
-from ancf_petsc.motion.integrators.first_order import SPEED_CHANGE, FirstOrder
+from ancf_petsc.motion.integrators.first_order import SPEED_CHANGE, FirstOrder, joined
 from ancf_petsc.solve.petsc import begins_a_given_option, default_options
 
 
@@ -34,6 +37,8 @@ class RungeKutta5dp(FirstOrder):
         self.begin(self.longest_stable)
         pair = EXPLICIT[self.table].lower is not None
         free = self.adaptive and pair and not begins_a_given_option("ts_")
+        self._last, self._steps = self.y.duplicate(), 0
+        self._first: NDArray | None = None
         self._leaping = self.compiled if free and self.compiled is not None and self.compiled.steady else None
 
     @property
@@ -41,7 +46,15 @@ class RungeKutta5dp(FirstOrder):
         return self._leaping is not None
 
     def advance(self, goal: float) -> Step:
-        return super().advance(goal) if self._leaping is None else self._leap(goal, self._leaping)
+        if self._leaping is not None:
+            return self._leap(goal, self._leaping)
+        step = super().advance(goal)
+        self._first, self._steps = None, self._steps + 1
+        return step
+
+    def destroy(self) -> None:
+        super().destroy()
+        self._last.destroy()
 
     def _leap(self, goal: float, compiled: CompiledMotion) -> Step:
         tolerance, before = self.settings.tolerance, self.time
@@ -64,7 +77,33 @@ class RungeKutta5dp(FirstOrder):
         omega = self.highest_frequency
         return self.highest_stable / omega if omega else self.equations.duration
 
+    def state(self) -> dict[str, Any]:
+        last = self._last.array_r if self._carries and self._steps else None
+        return {**super().state(), "last": None if last is None else self._halves(last)}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        super().restore(state)
+        if state["last"] is not None:
+            self._first = joined(state["last"])
+
+    def restart(self) -> None:
+        super().restart()
+        self._steps = 0
+
+    @property
+    def _carries(self) -> bool:
+        """Whether a step begins with the rates that the one before ended with, which hold what it rounded."""
+        return EXPLICIT[self.table].reuses_last and self._leaping is None
+
     def _rates(self, ts: PETSc.TS, t: float, y: PETSc.Vec, f: PETSc.Vec) -> None:
+        if self._first is not None and t == self.time:  # of all attempts at the first step
+            f.array[:] = self._first
+        else:
+            self._compute_rates(t, y, f)
+        if self._carries:
+            f.copy(self._last)
+
+    def _compute_rates(self, t: float, y: PETSc.Vec, f: PETSc.Vec) -> None:
         if self.compiled is not None:
             self.compiled.rates(t, y.array_r, f.array_w)
             return

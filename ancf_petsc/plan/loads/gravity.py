@@ -7,7 +7,7 @@ import numpy as np
 from ancf_petsc.input.loads import GravitySpec
 from ancf_petsc.model.body import Body, Floats
 from ancf_petsc.model.load import Load
-from ancf_petsc.model.mass import lumped_shares
+from ancf_petsc.model.mass import lumped_masses, uniform_masses
 from ancf_petsc.model.ramp import Ramp
 from ancf_petsc.plan.part import Part
 
@@ -30,10 +30,6 @@ def nodal_mass(body: Body, *, lumped: bool) -> Floats:
     density = np.empty(len(body.cells))
     for region in body.regions:
         density[region.first : region.last] = region.density or 0.0
-    tables = body.element.tables("mass")
-    means = body.mapped(tables.weights @ tables.values / tables.weights.sum())
-    if lumped:
-        means = np.broadcast_to(lumped_shares(body.element), body.cells.shape)
-    share = (density * body.volumes)[:, None] * means
+    share = density[:, None] * (lumped_masses(body) if lumped else uniform_masses(body))
     sums = np.bincount(body.cells.ravel(), share.ravel(), minlength=len(body.reference))
     return sums[: body.owned].astype(float)

@@ -11,15 +11,20 @@ bodies.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import log10
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.matrix import Matrix
+from ancf_petsc.parallel.fields import field
 from ancf_petsc.solve.linear.rigid import rigid_motions
 from ancf_petsc.solve.linear.two_level import TwoLevel
-from ancf_petsc.solve.petsc import default_options, is_given
+from ancf_petsc.solve.petsc import default_options, direct_package, is_given
 
 DIRECT_LIMIT, CURVED_LIMIT = 300, 5_000  # measured by `ancf bench alternatives/direct alternatives/iterative`
 TWO_LEVEL_LIMIT, MOST_RANKS = (
@@ -47,6 +52,8 @@ class LinearSolver:
         self.direct = self.dof <= limit and not chosen
         self._fresh_rate: float | None = None
         self._rate: float | None = None
+        self._fell_back = False
+        self._made: tuple[NDArray, NDArray] | None = None  # state and diagonal added, of the preconditioner
         few = self.dof <= TWO_LEVEL_LIMIT and assembly.comm.size <= MOST_RANKS
         self._two_level = None
         if matrix.symmetric and few and not (chosen or self.direct):
@@ -70,7 +77,7 @@ class LinearSolver:
         if self.direct:
             self.ksp.setType(PETSc.KSP.Type.PREONLY)
             pc.setType(PETSc.PC.Type.CHOLESKY if self.matrix.symmetric else PETSc.PC.Type.LU)
-            pc.setFactorSolverType("petsc" if self.small else "mumps")
+            pc.setFactorSolverType("petsc" if self.small else direct_package())
             if self.small:
                 pc.setFactorOrdering("qmd")
             return
@@ -95,7 +102,7 @@ class LinearSolver:
     def fall_back_to_direct(self) -> None:
         """Factor from now on: for tangents that conjugate gradients cannot solve."""
         self.ksp.reset()
-        self.direct = True
+        self.direct = self._fell_back = True
         self._configure()
         self.ksp.getPC().setReusePreconditioner(False)
         self.ksp.setFromOptions()
@@ -109,9 +116,9 @@ class LinearSolver:
         """Give the KSP its operator and the matrix that the preconditioner is made of."""
         self.ksp.setOperators(self.operator, self.matrix.mat)
 
-    def renew_if_tired(self, x: PETSc.Vec) -> None:
-        """Before a solve with a new tangent at x: factor it, or keep the preconditioner if its last solve was about
-        as quick as its first.
+    def renew_if_tired(self, x: PETSc.Vec, shift: NDArray | None = None) -> None:
+        """Before a solve with a new tangent at x, a diagonal (3 n,) added to it: factor it, or keep the preconditioner if its
+        last solve was about as quick as its first.
         """
         self.set_operators()
         self.take(x)
@@ -122,6 +129,8 @@ class LinearSolver:
             self._fresh_rate = None
             self.ksp.setUp()
             pc.setReusePreconditioner(True)
+        if tired and not self.direct:
+            self._made = x.array_r.copy(), np.zeros_like(x.array_r) if shift is None else shift.copy()
 
     def note_effort(self, iterations: int, reduction: float) -> None:
         """After a solve: iterations it took for a decade of residual."""
@@ -130,6 +139,21 @@ class LinearSolver:
         self._rate = iterations / max(-log10(reduction), 0.5)
         if self._fresh_rate is None:
             self._fresh_rate = self._rate
+
+    def state(self) -> dict[str, Any]:
+        """What it keeps from one tangent to the next: a preconditioner, as the state it was made at."""
+        kept = None if self.direct or self._made is None else [field(values) for values in self._made]
+        return {"fell_back": self._fell_back, "rates": [self._fresh_rate, self._rate], "made": kept}
+
+    def restore(self, state: dict[str, Any], make: Callable[[NDArray, NDArray], None]) -> None:
+        """Go on from a state. make(x, shift) has to call `renew_if_tired` with the tangent there, (n, 3) both."""
+        if state["fell_back"] and not self.direct:
+            self.fall_back_to_direct()
+        if state["made"] is not None and not self.direct:
+            self._fresh_rate = None
+            make(*state["made"])
+            self.ksp.setUpOnBlocks()
+            self._fresh_rate, self._rate = state["rates"]
 
     def describe(self) -> str:
         """The solver in words, as it is after the options were read."""
@@ -149,7 +173,7 @@ class LinearSolver:
     def _set_rigid_motions(self, x: PETSc.Vec) -> None:
         """Give multigrid the rigid motions of the state x."""
         vectors = []
-        for mode in rigid_motions(self.assembly.model, x.array_r.reshape(-1, 3)):
+        for mode in rigid_motions(self.assembly.model, self.assembly.along_axes(x.array_r.reshape(-1, 3))):
             vectors.append(self.assembly.vector())
             vectors[-1].array[:] = mode.ravel()
         rigid = PETSc.NullSpace().create(vectors=vectors, comm=self.assembly.comm)
