@@ -24,7 +24,7 @@ CURES = {
 STARTING = 120.0
 """Seconds a process may take to load a library: network drives are slow."""
 PATIENCE, SLOWEST = 8.0, 1e5
-"""Seconds of processor time, and bytes a second: damaged counts keep libraries busy for ever; they read whole files a hundred times faster."""
+"""Seconds of processor time, and bytes a second: damaged counts keep libraries busy for ever; whole files take a hundredth."""
 WAITING = 15.0
 """Times as long may pass on a machine that has other work."""
 LONGEST_REASON = 300
