@@ -175,17 +175,17 @@ def load_steps() -> list[str]:
 
 
 def longest(rows: Sequence[StudyRow], key: str, unit: str, factor: float) -> str:
-    """The largest load up to which every run reached its end without a cut."""
+    """The largest load up to which every run reached its end in no more steps than it was asked for."""
 
     def load(row: StudyRow) -> float:
         return max(abs(float(part)) for part in written(row.text(key)).strip("[]").split(","))
 
     best = 0.0
     for row in sorted(rows, key=load):
-        if row.outcome != "reached":
+        if not row.ended or row.number("taken") > row.number("statics.steps"):
             break
         best = load(row)
-    return f"{factor * best:g} {unit}" if best else "none"
+    return f"{factor * best:g} {unit}" if best else "none of these"
 
 
 BLOCKS = {

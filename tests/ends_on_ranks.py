@@ -17,8 +17,9 @@ from mpi4py import MPI
 from ancf_petsc import case_from_dict
 from ancf_petsc.analysis.build import build
 from ancf_petsc.model.assembly import Assembly
+from ancf_petsc.solve.critical import Watch
 from ancf_petsc.solve.newton import Newton
-from ancf_petsc.solve.stability import why_it_ends
+from ancf_petsc.solve.stability import Last, why_it_ends
 from ancf_petsc.solve.weakest import weakest_cell
 
 WAVES = np.array(
@@ -38,8 +39,15 @@ def describe(data: dict[str, Any], state: dict[str, Any], comm: MPI.Comm) -> dic
     x = assembly.reference_vector()
     x.array[:] = placed(assembly.model.reference[: assembly.model.owned], **state).ravel()
     weakest = weakest_cell(assembly, x)
+    watch = Watch(newton)
+    start = assembly.reference_vector()
+    newton.tangent_at(start)
+    watch.begin(0.0)
+    error = why_it_ends(newton, watch, Last(0.25, x, "no convergence", 1e-4, 0.3, (0.25, x)))
+    watch.destroy()
     found = {
-        "line": str(why_it_ends(newton, x, 0.25, "no convergence", 1e-4)),
+        "line": str(error),
+        "facts": error.facts,
         "weakest": [weakest.cell, weakest.stretch, weakest.det, weakest.place.tolist(), weakest.law],
     }
     if comm.size == 1:

@@ -19,6 +19,7 @@ from ancf_petsc.advise.line import Discretisation
 from ancf_petsc.advise.meshes import MeshFamily, elements_for, families
 from ancf_petsc.advise.question import read_quantity, read_target
 from ancf_petsc.advise.scene import working_case
+from ancf_petsc.advise.search import begin, search
 from ancf_petsc.advise.steps import fewest_steps
 from ancf_petsc.cli import main
 from ancf_petsc.errors import CaseError
@@ -142,14 +143,14 @@ class MadeTrial:
     stretch: float | None = 0.99
 
     failure = ""
-    row = None
+    row = run = None
 
     @property
     def seconds(self):
         return 1.0 + self.solution
 
     def __post_init__(self):
-        self.row = self
+        self.row = self.run = self
 
     def stretch_at(self, asked):
         return self.stretch
@@ -182,7 +183,7 @@ def test_error_and_cost_beyond_what_was_run():
         assert line.dof_at(level) == pytest.approx(3000 / 0.512**level, rel=1e-3)
         assert line.seconds(level) == pytest.approx(1 + 1e-4 * (3000 / 0.512**level) ** 1.2, rel=1e-3)
     assert min(line.candidates()) == -1.0
-    assert max(line.candidates()) == 8.0
+    assert max(line.candidates()) == 8.0  # six beyond the third trial
     line.stopped = "surface_fold"
     assert max(line.candidates()) == 2.0
 
@@ -224,8 +225,77 @@ def test_two_levels_are_no_limit():
 
 
 def test_allowed_errors():
-    assert allowed(BestGuess(1.0, 0.002, True, ""), 0.01) == pytest.approx(0.008)
+    assert allowed(BestGuess(1.0, 0.001, True, ""), 0.01) == pytest.approx(0.0095)
     assert allowed(BestGuess(1.0, 0.004, True, ""), 0.01) == pytest.approx(0.007)
+
+
+# --- the search, on laws of error and cost
+
+
+class PowerLab:
+    """Makes trials by the laws of `LawLine`, and counts what they would take."""
+
+    asked = None
+
+    def __init__(self, budget=1e6):
+        self.budget, self.spent = budget, 0.0
+
+    @property
+    def left(self):
+        return self.budget - self.spent
+
+    def plan(self, changes):
+        return MadeTrial(0.0, Facts(1, changes["dof"], 1.0, 2), 0.0)
+
+
+class LawLine(Discretisation):
+    """An element with error (1 at h = 1) and seconds by powers; h = 0.8**level."""
+
+    def law(self, error, order, rate, dof):
+        self.laws = error, order, rate, dof
+        return self
+
+    def changes(self, level):
+        return {"dof": round(self.laws[3] / 0.512**level)}
+
+    def make(self, lab, level):
+        error, order, rate, _ = self.laws
+        h, dof = 0.8**level, self.changes(level)["dof"]
+        trial = MadeTrial(-100.0 * (1 + error * h**order), Facts(dof, dof, h, 3), rate * dof**1.3)
+        self.trials[level] = trial
+        lab.spent += trial.seconds
+        return trial
+
+
+@pytest.mark.parametrize("target", [0.05, 0.01, 0.001])
+@pytest.mark.parametrize("orders", [(2, 4, 3), (1.2, 1.4, 1.3), (2, 2, 2)])
+def test_the_search_finds_the_cheapest(target, orders):
+    laws = [(0.4, orders[0], 3e-6, 300), (0.05, orders[1], 1e-5, 1500), (-0.12, orders[2], 2e-5, 900)]
+    lines = [LawLine(str(k), FAMILY).law(*law) for k, law in enumerate(laws)]
+    lab = PowerLab()
+    begin(lines, lab)
+    found = search(lines, lab, target)
+    assert found.complete
+    best = found.choices[0]
+    assert best.measured
+    true = abs(best.line.trials[best.level].value / -100.0 - 1)
+    assert true <= target
+    costs = [
+        1 + rate * (dof / 0.512**level) ** 1.3
+        for error, order, rate, dof in laws
+        for level in np.arange(-1, 40, 0.25)
+        if abs(error) * 0.8 ** (order * level) <= target
+    ]
+    assert best.seconds <= 1.5 * min(costs)
+
+
+def test_a_search_without_budget_says_that_it_is_not_complete():
+    lines = [LawLine("3413", FAMILY).law(0.4, 1.0, 1e-3, 3000)]
+    lab = PowerLab(budget=500.0)
+    begin(lines, lab)
+    found = search(lines, lab, 1e-4)
+    assert not found.complete
+    assert lab.spent < 1000
 
 
 # --- with runs

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from family import SECTION, cantilever, mesh_of, motion
 from rings import disc
+from test_normal_support import eighth, turn_of
 
 from ancf_petsc import open_results
 
@@ -47,6 +48,7 @@ def in_motion(code, law, folder, **dynamics):
 def cases(folder):
     mean = {"integrator": "energy_momentum", "step": 0.005}
     alpha = {"integrator": "generalized_alpha", "step": 0.005}
+    dynamics = {"duration": 0.1, "outputs": 2, "integrator": "generalized_alpha", "step": 0.05}
     explicit = {"integrator": "runge_kutta_4", "step": 2e-4}
     return {
         "3-10-1-3 at rest": at_rest("3-10-1-3", "svk", folder),
@@ -61,6 +63,8 @@ def cases(folder):
         "3-10-1-3 in motion": in_motion("3-10-1-3", "neo_hooke", folder, **alpha, damping=1.0),
         "2-6-1-2 in motion": in_motion("2-6-1-2", "svk", folder, **alpha),
         "2412 in motion": in_motion("2412", "neo_hooke", folder, **mean),
+        "on oblique planes, pressed": eighth("3-10-1-3", turn_of(1), folder),
+        "on oblique planes, in motion": eighth("3413", turn_of(2), folder, dynamics=dynamics),
         "ring of 2-6-1-2 pressed": disc("2-6-1-2", "neo_hooke", folder),
         "ring of 2432 pressed": disc("2432", "svk", folder),
         "ring of 2-6-1-2 in motion": disc("2-6-1-2", "neo_hooke", folder, **mean),

@@ -204,3 +204,17 @@ def test_a_body_without_rims_names_those_that_have_them(tmp_path):
     name = next(name for name, body in BODIES.items() if not body.rims)
     with pytest.raises(CaseError, match=f"--rim: {name} has no bonded face.*expected one of .*cube"):
         make_mesh(name, tmp_path / "m.msh", rim=0.001)
+
+
+@pytest.mark.parametrize(
+    ("name", "width", "thinnest"), [("slender_300", 1 / 300, 1.0), ("thin_layer_100", 0.1, 0.01)]
+)
+def test_beams_are_slender_or_have_one_thin_layer(tmp_path, name, width, thinnest):
+    mesh = read_mesh(
+        make_mesh(name, tmp_path / "m.msh", divisions=(5, 1, 1), hexahedra=True), ("hexahedron",)
+    )
+    assert statistics(mesh).volume == pytest.approx(width**2, rel=1e-12)
+    layers = np.diff(np.unique(np.round(mesh.points[:, 0], 12)))
+    assert layers / layers.max() == pytest.approx(
+        [1, 1, thinnest, 1, 1], abs=1e-9
+    )  # coordinates are rounded to 1e-12

@@ -56,7 +56,7 @@ tests = ["no_such_file"]
 [[change]]
 name = "twice"
 file = "a"
-old = "exit_code = 3"
+old = "exit_code = 1"
 new = ""
 breaks = "nothing"
 tests = ["cases"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import time
+from runpy import run_path
 
 import numpy as np
 import pytest
@@ -83,3 +84,13 @@ def test_a_rank_that_fails_ends_all_with_its_message(where, ranks, rank, mpirun,
     assert words in done.stderr
     assert f"rank {rank}" in done.stderr
     assert ended - failed < 5.0
+
+
+def test_memory_and_handles_do_not_grow(project):
+    """A small version of scripts/soak_leaks: a leak of one vector of this body a step would be 0.7 MB, of a file a run 9."""
+    soak = run_path(str(project / "scripts" / "soak_leaks"))
+    motion = soak["motion"]("generalized_alpha")
+    found = [soak["many_steps"]("motion", motion, 400), soak["many_runs"](12)]
+    assert all(row["handles_growth"] <= 0 for row in found), found
+    assert found[0]["memory_growth_mb"] < 0.7, found
+    assert found[1]["memory_growth_mb"] < 6.0, found

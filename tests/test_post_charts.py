@@ -118,6 +118,21 @@ def test_a_map_has_a_cell_a_run_coloured_by_its_end(motion):
     assert not panels[0].predicted
 
 
+def test_a_key_that_is_taken_away_is_a_value_of_a_map(tmp_path):
+    keys = {"petsc.search": ["", "bt"], "size": [1, 2]}
+    rows = [
+        {"petsc.search": search, "size": size, "run": f"{search}{size}"}
+        for search in ("", "bt")
+        for size in (1, 2)
+    ]
+    spec = chart(kind="map", x="size", y="petsc.search")
+    study = read_study(study_folders.write(tmp_path / "searches", keys=keys, quantities={}, rows=rows))
+    (panel,) = maps.map_panels(study, spec)
+    assert sorted((p.x, p.y) for p in panel.lines[0].points) == [(0, 0), (0, 1), (1, 0), (1, 1)]
+    figure = maps.draw_map(study, spec, [panel])
+    assert [tick.get_text() for tick in figure.axes[0].get_yticklabels()] == ["default", "bt"]
+
+
 def test_predicted_lines_of_a_map_lie_between_the_cells_of_their_values(motion):
     panels = maps.map_panels(motion, motion.charts[0])
     figure = maps.draw_map(motion, motion.charts[0], panels)
@@ -144,6 +159,16 @@ def test_values_have_lines_predictions_and_relative_heights(motion):
     assert [p.y for p in theta.predicted[1].shown] == [1, 2]
     _, relative = value_panels(motion, spec.model_copy(update={"relative": True}))
     assert [p.y for p in relative.lines[2].shown] == pytest.approx([1, 2, 4, 8])
+
+
+def test_values_may_stand_at_equal_distances_and_predictions_between_them(motion):
+    spec = chart(
+        kind="values", x="dynamics.step", quantity="drift", lines="initial.spin", panels="dynamics.integrator",
+        x_scale="even", predicted=[{"label": "theory", "points": [[0.01, 1], [0.03, 2], [0.08, 3]]}],
+    )  # fmt: skip
+    _, theta = value_panels(motion, spec)
+    assert [p.x for p in theta.lines[0].shown] == [0, 1, 2, 3]
+    assert [p.x for p in theta.predicted[0].shown] == [0, 1.5, 3]
 
 
 def test_curves_are_sums_of_columns_over_their_start(motion):

@@ -248,3 +248,19 @@ def test_what_cannot_be_laid_over_is_told(block, arguments, message, tmp_path, c
     named = [str(tmp_path / word) if word == "FILE" else word for word in arguments]
     assert main(["plot", str(block.folder), *named]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_the_end_and_the_cuts_of_a_run_are_marked_on_its_curves(block):
+    """A cross with the event at the last row, in all figures over it; ticks where steps were cut."""
+    end = {"kind": "surface_fold", "message": "the free surface folds"}
+    cuts = [{"action": "halved", "pseudo_time": s, "reason": "no convergence"} for s in (0.2, 0.2, 0.7)]
+    block.__dict__["summary"] = {**block.summary, "end": end, "step_control": cuts}
+    (axes,) = figures.force_stroke([block]).axes
+    (text,) = [text for text in axes.texts if text.get_text() == "surface fold"]
+    assert text.xy == pytest.approx((-block.curve["stroke"][-1], -block.curve["force"][-1]))
+    marked = figures.steps([block]).axes
+    ticks = [line for line in marked[0].lines if line.get_marker() == "|"]
+    assert [line.get_xdata().tolist() for line in ticks] == [[0.2, 0.7]]
+    block.__dict__["summary"] = {**block.summary, "end": {"kind": "reached"}, "step_control": []}
+    (axes,) = figures.force_stroke([block]).axes
+    assert not axes.texts

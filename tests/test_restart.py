@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import signal
+from pathlib import Path
 
 import pytest
 from motion_cases import pendulum
@@ -17,6 +18,8 @@ from ancf_petsc.analysis.checkpoint import Checkpoints
 from ancf_petsc.analysis.static_run import StaticRun
 from ancf_petsc.cli import main
 from ancf_petsc.results.checkpoint_file import NAMES
+from ancf_petsc.results.folder import check_folder
+from ancf_petsc.results.mark import Mark
 
 PVC = "pvc_block_234.msh"
 DRIVEN = [
@@ -251,6 +254,31 @@ def test_a_ramp_over_the_duration_is_not_stretched(tmp_path):
     assert open_results(tmp_path / "run").times[-1] == 0.02
 
 
+def test_a_checkpoint_of_another_version_is_refused(kept, stopped, monkeypatch):
+    monkeypatch.setattr("ancf_petsc.analysis.provenance.versions", lambda: {"ancf_petsc": "99.0"})
+    with pytest.raises(
+        EnvironmentProblem, match=r"written by ancf_petsc .*, this is 99\.0: go on with that version"
+    ):
+        run(kept[1], stopped, restart=True)
+
+
+def test_a_folder_that_cannot_be_written_any_more_is_an_environment_problem():
+    """/proc takes no files, not even root's."""
+    with pytest.raises(EnvironmentProblem, match="cannot be written") as told:
+        check_folder(Path("/proc"), "Block", kept=True)
+    assert told.value.exit_code == 4
+
+
+def test_a_live_run_is_left_alone(kept, stopped):
+    mark = Mark(stopped)
+    mark.take({"title": "Block", "hash": ""})
+    try:
+        with pytest.raises(CaseError, match="another run is writing into this folder"):
+            run(kept[1], stopped, restart=True)
+    finally:
+        mark.release()
+
+
 @pytest.mark.parametrize("number", [signal.SIGUSR1, signal.SIGTERM])
 def test_a_signal_saves_within_a_step(number, kept, tmp_path, monkeypatch):
     """No checkpoint would have been due; the row that the interruption leaves is gone after the restart."""
@@ -343,3 +371,14 @@ def test_on_other_ranks_to_rounding(kept, ancf, tmp_path):
         shutil.copytree(kept[2][start], tmp_path / str(ranks))
         ancf("run", "case.toml", "--restart", "--out", str(ranks), "--quiet", ranks=ranks)
         assert largest_difference(kept[0] / "whole", tmp_path / str(ranks)) < 1e-9
+
+
+def test_on_two_ranks_to_the_last_bit_and_a_full_disk(mpirun, project, tmp_path):
+    """Conjugate gradients with their kept preconditioner, explicit steps with Chebyshev's iteration; a disk that runs full while
+    the root writes the second checkpoint is said on both ranks, and the first one is good.
+    """
+    said = mpirun(2, ["-m", "mpi4py", project / "tests" / "restart_on_ranks.py", tmp_path]).stdout
+    found = json.loads(said.partition("FOUND")[2])
+    assert found["statics"] == found["central"] == []
+    assert found["full"] == [4, 4]
+    assert found["after"] == []

@@ -14,7 +14,7 @@ from ancf_petsc.advise.line import Discretisation
 from ancf_petsc.advise.meshes import elements_for, families
 from ancf_petsc.advise.motion import SPACE, Timing, timings
 from ancf_petsc.advise.question import read_quantity, read_target
-from ancf_petsc.advise.report import Advice, Recommendation
+from ancf_petsc.advise.report import Advice, Recommendation, percent
 from ancf_petsc.advise.scene import working_case
 from ancf_petsc.advise.search import FIRST, Ranking, begin, search
 from ancf_petsc.advise.steps import STEPS, fewest_steps
@@ -214,7 +214,8 @@ def _cheaper_in_time(work: _Search, found: Ranking, guess: BestGuess, ways: list
 
 def _advice(work: _Search, found: Ranking, timing: Timing | None, case: Case, quantity: str) -> Advice:
     guess = found.guess
-    made = [_recommended(choice, guess, timing, work) for choice in found.choices[:2]] if guess else []
+    known = guess is not None and guess.uncertainty <= work.target
+    made = [_recommended(choice, guess, timing, work) for choice in found.choices[:2]] if known else []
     failures = {
         line.name: line.stopped
         for line in work.lines
@@ -223,7 +224,12 @@ def _advice(work: _Search, found: Ranking, timing: Timing | None, case: Case, qu
     notes = list(work.notes)
     if not found.complete:
         notes.append("the budget or the meshes ended the search before it was complete")
-    if guess is not None and not guess.claimed:
+    if guess is not None and not known:
+        notes.append(
+            f"the reference is uncertain by {percent(guess.uncertainty)}, more than the target: "
+            "a larger --budget makes it surer where finer meshes converge"
+        )
+    elif guess is not None and not guess.claimed:
         notes.append(
             "without a limit the error is against where the best ladder leads: more than that cannot be promised"
         )

@@ -10,10 +10,12 @@ from ancf_petsc.advise.lab import Lab
 from ancf_petsc.advise.line import Discretisation
 from ancf_petsc.studies.richardson import ASYMPTOTIC
 
-SURE = 1.0 / 3.0
-"""Of the target: a reference that is less uncertain is good enough to choose by, and its uncertainty is kept as margin."""
+SURE = 0.2
+"""Of the target: a reference that is less uncertain is good enough to choose by; half its uncertainty is kept as margin."""
 MARGIN = 0.7
-"""Of the target, that errors may reach where the reference is more uncertain, or the error is predicted."""
+"""Of the target, that errors may reach where the reference is more uncertain."""
+BETWEEN, BEYOND = 1.0, 0.95
+"""Of what is allowed, that predicted errors may reach, between levels that were run and beyond them; what is chosen is run."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ def _last_step(line: Discretisation) -> float:
 
 def allowed(guess: BestGuess, target: float) -> float:
     """The error against the guess up to which a measured one is taken."""
-    return target - guess.uncertainty if guess.uncertainty <= SURE * target else MARGIN * target
+    return target - guess.uncertainty / 2 if guess.uncertainty <= SURE * target else MARGIN * target
 
 
 def ranked(lines: Sequence[Discretisation], guess: BestGuess, target: float) -> list[Choice]:
@@ -92,7 +94,8 @@ def ranked(lines: Sequence[Discretisation], guess: BestGuess, target: float) -> 
         for level in line.candidates():
             measured = level in line.trials
             error = line.error(level, guess.value)
-            if not error <= (limit if measured else min(limit, MARGIN * target)):
+            margin = 1.0 if measured else BETWEEN if line.levels[0] < level < line.levels[-1] else BEYOND
+            if not error <= margin * limit:
                 continue
             seconds = line.seconds(level)
             if best is None or seconds < best.seconds:

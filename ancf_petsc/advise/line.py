@@ -16,6 +16,10 @@ ORDERS = (0.3, 7.0)
 USUAL_GROWTH = 1.25
 """Of the seconds of a solution with the degrees of freedom, until three trials show it."""
 GROWTHS = (1.0, 2.0)
+AHEAD = {1: 1.0, 2: 4.0, 3: 6.0}
+"""Levels beyond the finest that errors are predicted for, by the number of trials."""
+FRACTION = 0.25
+"""Of a level, where a family has meshes between whole ones."""
 WORTH = 1500
 """Degrees of freedom below which seconds of solutions say nothing of their growth."""
 
@@ -148,11 +152,12 @@ class Discretisation:
         return constant + finest.solution * (self.dof_at(level) / finest.facts.dof) ** growth
 
     def candidates(self) -> list[float]:
-        """Levels that may be taken: those known, those between them, and up to six beyond."""
+        """Levels that may be taken: those known, those between them, and a few beyond, more where more is known."""
         if not self.trials:
             return []
         first, last = self.levels[0], self.levels[-1]
-        step = 0.5 if self.family.fractions else 1.0
+        step = FRACTION if self.family.fractions else 1.0
         low = first - (1.0 if self.family.fractions else 0.0)
-        found = [low + step * k for k in range(int((last + 6 - low) / step) + 1)]
+        high = last + AHEAD[min(len(self.trials), 3)]
+        found = [low + step * k for k in range(int((high - low) / step) + 1)]
         return [level for level in found if not self.stopped or level <= last if self.family.mesh(level)]

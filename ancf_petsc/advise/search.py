@@ -59,7 +59,7 @@ def search(lines: Sequence[Discretisation], lab: Lab, target: float) -> Ranking:
         choices = ranked(lines, guess, target)
         wanted = _next(lines, guess, choices, target, lab)
         if wanted is None:
-            return Ranking(guess, choices, complete=bool(choices))
+            return Ranking(guess, choices, complete=bool(choices) and guess.uncertainty <= SURE * target)
         line, level = wanted
         line.make(lab, level)
         if lab.left <= 0:

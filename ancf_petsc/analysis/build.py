@@ -14,6 +14,7 @@ from ancf_petsc.element.catalog import element
 from ancf_petsc.input.load import Case
 from ancf_petsc.kernel.choice import kernel_set
 from ancf_petsc.model.body import Body
+from ancf_petsc.model.frames import Frames
 from ancf_petsc.model.load import Load
 from ancf_petsc.model.model import Model
 from ancf_petsc.parallel.exchange import agree, on_root
@@ -50,11 +51,13 @@ def build_from(
     root = FromRoot(comm, plan)
     body = _make_body(case, root, owners)
     rows = _Rows(root, body)
+    frames = _frames(root, rows)
     model = Model(
         **vars(body),
         drive=rows(lambda plan: plan.supports.drive),
+        frames=frames,
         drives=root.value(lambda plan: plan.supports.drives),
-        loads=_loads(case, body, rows),
+        loads=_loads(case, body, rows, frames),
         groups={
             name: np.flatnonzero(inside) for name, inside in rows.owned(lambda plan: plan.members).items()
         },
@@ -148,14 +151,27 @@ class _Rows:
         return {name: np.ascontiguousarray(together[:, k]) for k, name in enumerate(names)}
 
 
-def _loads(case: Case, body: Body, rows: _Rows) -> list[Load]:
-    """This rank's share of all loads."""
+def _frames(root: FromRoot[Plan], rows: _Rows) -> Frames:
+    """Those of this rank's nodal vectors. Collective."""
+    axes = root.value(lambda plan: plan.supports.axes)
+    if not len(axes):
+        return Frames(np.empty(0, np.int64), axes)
+    frame = rows(lambda plan: plan.supports.frame)
+    vectors = np.flatnonzero(frame >= 0)
+    return Frames(vectors, axes[frame[vectors]])
+
+
+def _loads(case: Case, body: Body, rows: _Rows, frames: Frames) -> list[Load]:
+    """This rank's share of all loads, with components of unknowns."""
     entered = rows.owned(lambda plan: plan.loads)
     ramps = Ramps(case.spec, case.file)
-    return [
+    loads = [
         KINDS[spec.type].share(spec, body, entered.get(number), ramps.of_load(spec.ramp))
         for number, spec in enumerate(case.spec.load)
     ]
+    for load in loads:
+        frames.to_frames(load.pattern)
+    return loads
 
 
 def _where_not_zero(weights: NDArray) -> tuple[NDArray, NDArray]:

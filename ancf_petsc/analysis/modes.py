@@ -87,8 +87,8 @@ def _write(
         order.points, order.kind, order.cells, order.node_numbers, order.cell_numbers, order.groups
     )
     points = OutputPoints(assembly, order)
-    before = x.array_r.reshape(-1, 3) - built.model.reference[: built.model.owned]
-    for row, shape in zip(rows, modes.shapes, strict=True):
+    before = assembly.along_axes(x.array_r.reshape(-1, 3)) - built.model.reference[: built.model.owned]
+    for row, shape in zip(rows, map(assembly.along_axes, modes.shapes), strict=True):
         largest = comm.allreduce(float(np.abs(shape[built.model.own_positions]).max(initial=0.0)), MPI.MAX)
         shown = before + LARGEST_SHOWN * built.model.size / largest * shape
         fields = {"displacement": points(shown)}

@@ -109,4 +109,4 @@ def set_velocity(v: PETSc.Vec, mass: Mass, spec: InitialSpec) -> None:
     arm, uniform = model.reference[: model.owned].copy(), np.zeros((model.owned, 3))
     arm[model.own_positions] -= centre - model.origin
     uniform[model.own_positions] = spec.velocity
-    v.array[:] = (uniform + np.cross(spec.spin, arm)).ravel()
+    v.array[:] = model.frames.to_frames(uniform + np.cross(spec.spin, arm)).ravel()

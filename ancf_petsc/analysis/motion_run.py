@@ -185,7 +185,9 @@ class MotionRun:
             x, v, now = self.integrator.x, self._velocity(), self.integrator.time
             balance = self.equations.out_of_balance(now, x, v, self._acceleration())
             more = {**self._energies(), **self._momenta(), **self._since}
-            row = self.record.write({"time": now}, x, balance, more, {"velocity": v})
+            row = self.record.write(
+                {"time": now}, x, balance, more, {"velocity": self.assembly.along_axes(v)}
+            )
             self._log_output(row)
         self._since = dict.fromkeys(MOTION_COUNTS, 0)
         self._written = now
@@ -204,8 +206,9 @@ class MotionRun:
     def _potential_energy(self) -> float:
         """- sum m g . r with gravity as it is now."""
         model = self.assembly.model
-        positions = self.integrator.x.array_r.reshape(-1, 3).copy()
-        positions[model.own_positions] += model.origin
+        shift = np.zeros((model.owned, 3))
+        shift[model.own_positions] = model.origin
+        positions = self.integrator.x.array_r.reshape(-1, 3) + model.frames.to_frames(shift)
         s = self.integrator.time / self.duration
         own = sum(
             -load.ramp.value(s) * float(np.vdot(load.pattern, positions))

@@ -102,7 +102,7 @@ class Record:
         rows = {"curve.csv": row}
         if self.spec.probe:
             rows["probes.csv"] = {**time, **self._probes(x)}
-        positions, model = x.array_r.reshape(-1, 3), self.assembly.model
+        positions, model = self.assembly.along_axes(x.array_r.reshape(-1, 3)), self.assembly.model
         nodes = {"displacement": positions - model.reference[: model.owned], **(node_fields or {})}
         points = {name: self._points(rows) for name, rows in nodes.items()}
         if model.element.has_slopes:

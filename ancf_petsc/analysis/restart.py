@@ -72,8 +72,19 @@ def find(folder: Path, about: Provenance, *, extend: bool) -> Found:
             for saved in whole
         }
         raise _nothing_whole(folder, {path.name: why for path, why in wrong.items()} | reasons)
+    _refuse_other_program(usable[0], about)
     _compare(usable[0], about, extend=extend)
     return Found(goes_on=True, saved=usable[0])
+
+
+def _refuse_other_program(saved: Saved, about: Provenance) -> None:
+    """Raise EnvironmentProblem for a checkpoint of another version of the program, which may carry on something else."""
+    theirs, ours = (said["ancf_petsc"] for said in (saved.about["run"]["versions"], about.versions))
+    if theirs != ours:
+        raise EnvironmentProblem(
+            f"{saved.path}: written by ancf_petsc {theirs}, this is {ours}: go on with that version, or run without --restart "
+            "to start from the beginning"
+        )
 
 
 def _is_done(folder: Path, about: Provenance) -> bool:

@@ -32,7 +32,7 @@ from ancf_petsc.parallel.exchange import all_meet, on_root
 from ancf_petsc.parallel.fields import Places
 from ancf_petsc.plan.plan import Plan, make_plan
 from ancf_petsc.results.folder import check_folder, claim_folder, reclaim_folder
-from ancf_petsc.solve.petsc import petsc_options, refuse_wrong_values
+from ancf_petsc.solve.petsc import free_what_python_dropped, petsc_options, refuse_wrong_values
 
 if TYPE_CHECKING:
     from ancf_petsc.analysis.motion import MotionAnalysis
@@ -92,6 +92,7 @@ def run_case(
         finally:
             if comm.size == 1 or _is_of_all_ranks(sys.exc_info()[1]):
                 solver.destroy()
+                free_what_python_dropped(comm)
     return folder
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,8 @@ from ancf_petsc.model.work import PathWork
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.solve.arc_length import ArcLength
 from ancf_petsc.solve.events import CriticalPoint
-from ancf_petsc.solve.load_path import LoadPath, Marks, PathStep
+from ancf_petsc.solve.load_path import LoadPath
+from ancf_petsc.solve.marks import Jump, Marks, PathStep
 from ancf_petsc.solve.newton import Newton
 from ancf_petsc.solve.rise import Rise, begins_loaded, rising
 from ancf_petsc.solve.stability import beyond_the_law
@@ -56,6 +57,9 @@ class StaticRun:
         self.assembly = newton.assembly
         self.totals = dict.fromkeys(COUNTS, 0)
         self.events: list[dict] = []
+        self.jumps: list[dict] = []
+        self._goes_on = spec.after_limit == "dynamics"
+        self._lost, self._jumped = 0.0, 0
         self.doubts: str | None = None
         self.control = newton.control
         self.end: dict[str, Any] = {}
@@ -85,6 +89,7 @@ class StaticRun:
             "since": self._since,
             "events": self.events,
             "doubts": self.doubts,
+            "jumps": [self.jumps, self._lost, self._jumped],
             "written": self._written,
             "row": self.record.row,
             "work": self.work.state(),
@@ -99,6 +104,7 @@ class StaticRun:
         """Let `go` go on from a state."""
         self.totals, self._since = dict(state["totals"]), dict(state["since"])
         self.events[:], self.doubts = state["events"], state["doubts"]
+        self.jumps[:], self._lost, self._jumped = state["jumps"]
         self._written, self.record.row = state["written"], dict(state["row"])
         self.work.restore(state["work"])
         self._restored = state
@@ -114,16 +120,14 @@ class StaticRun:
         if "path" not in self._restored:
             self.newton.set_pseudo_time(0.0)
             self.work.start(0.0, *conjugates(self.assembly, x, self.newton.out_of_balance(x)), length)
-        self._path = path = (ArcLength if self.spec.control == "arc_length" else LoadPath)(
-            self.newton,
-            self.marks,
-            self.spec.smallest_step,
-            self._on_step,
-            self.stop,
-            start=x,
-            on_bifurcation=self.spec.on_bifurcation,
-            on_event=self._on_event,
-        )
+        common = (self.newton, self.marks, self.spec.smallest_step, self._on_step, self.stop)
+        more: dict[str, Any] = {"on_bifurcation": self.spec.on_bifurcation, "on_event": self._on_event}
+        path: LoadPath | ArcLength
+        if self.spec.control == "arc_length":
+            path = ArcLength(*common, start=x, **more)
+        else:
+            path = LoadPath(*common, start=x, on_jump=self._on_jump if self._goes_on else None, **more)
+        self._path = path
         if "path" in self._restored:
             path.restore(self._restored["path"])
         try:
@@ -201,6 +205,42 @@ class StaticRun:
         log.warning("%s%s%s", where, event.words(), shown)
         self.events.append({**event.facts(), **curve, "load": load})
 
+    def _on_jump(self, jump: Jump, before: PETSc.Vec, x: PETSc.Vec) -> None:
+        """Rows of the states before and after damped motion; the energy it lost is what the work leaves."""
+        if jump.before != self._written:
+            self.newton.set_pseudo_time(jump.before)
+            self._write(jump.before, before, self.newton.out_of_balance(before))
+        was = dict(self.record.row)
+        self.newton.set_pseudo_time(jump.s)
+        balance = self.newton.out_of_balance(x)
+        work = self.work.jump(jump.s, *conjugates(self.assembly, x, balance))
+        lost = work - (self.assembly.strain_energy(x) - self.assembly.strain_energy(before))
+        self._lost += lost
+        self._jumped += 1
+        self._write(jump.s, x, balance)
+        self._log_jump(jump, was, self.record.spec.output.symmetry * lost)
+
+    def _log_jump(self, jump: Jump, was: Mapping[str, float], lost: float) -> None:
+        now = self.record.row
+        fact = {
+            "pseudo_time": jump.s,
+            "from": jump.before,
+            "cause": jump.why.facts.get("kind"),
+            "energy_lost": lost,
+        }
+        for name in ("stroke", "force"):
+            if name in now:
+                fact |= {name: now[name], f"{name}_before": was[name]}
+        self.jumps.append({**fact, "steps": jump.steps, "message": str(jump.why)})
+        shown = "".join(f", {n} {was[n]:.6g} to {now[n]:.6g}" for n in ("stroke", "force") if n in now)
+        log.warning(
+            "%s: damped dynamics at pseudo-time %.6g led to another equilibrium%s, energy lost %.6g",
+            jump.why,
+            jump.s,
+            shown,
+            lost,
+        )
+
     def _note_doubts(self, s: float, x: PETSc.Vec) -> None:
         """Warn once where the law is beyond its limit, at the end of the path and where loads turn; the summary has it."""
         if self.doubts is None and (found := beyond_the_law(self.assembly, x)) is not None:
@@ -210,7 +250,8 @@ class StaticRun:
     def _note_imbalance(self) -> None:
         """Warn where the work does not balance the energy: along a smooth path it does to far less than IMBALANCE."""
         work, energy = self.record.row["external_work"], self.record.row["strain_energy"]
-        off = abs(work - energy) / max(abs(work), abs(energy), 1e-300)
+        lost = self.record.row.get("dissipated_energy", 0.0)
+        off = abs(work - energy - lost) / max(abs(work), abs(energy), 1e-300)
         if self.doubts is None and off > IMBALANCE:
             self.doubts = (
                 f"external work {work:.6g} and strain energy {energy:.6g} differ by {100 * off:.1f} %: the path has jumped to "
@@ -229,9 +270,11 @@ class StaticRun:
 
     def _write(self, s: float, x: PETSc.Vec, out_of_balance: NDArray) -> None:
         with self.clock.part("output"):
-            more = {"external_work": self.work.total, **self._since}
+            more: dict[str, float] = {"external_work": self.work.total, **self._since}
+            if self._goes_on:
+                more |= {"dissipated_energy": self._lost, "jumps": self._jumped}
             self.record.write({"pseudo_time": s}, x, out_of_balance, more)
-        self._since = dict.fromkeys(COUNTS, 0)
+        self._since, self._jumped = dict.fromkeys(COUNTS, 0), 0
         self._written = s
 
     def _save_last_state(self, path: LoadPath | ArcLength) -> None:

@@ -41,6 +41,7 @@ class StaticAnalysis:
             return {}
         return {
             "critical_points": run.events,
+            "jumps": run.jumps,
             "doubts": run.doubts,
             "end": run.end,
             **run.control.facts(),

@@ -35,10 +35,18 @@ def execute(arguments: argparse.Namespace) -> int:
         plan = make_plan(case)
         _print_mesh(plan)
         _print_case(case, plan)
+        _print_doubts(case, plan)
         print("case is valid")
 
     on_root(comm, show)
     return 0
+
+
+def _print_doubts(case: Case, plan: Plan) -> None:
+    from ancf_petsc.cli.console import show_facts
+    from ancf_petsc.plan.plausible import doubts_of
+
+    show_facts([("looks wrong", doubt) for doubt in doubts_of(case, plan)])
 
 
 def _print_mesh(plan: Plan) -> None:

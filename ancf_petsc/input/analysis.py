@@ -35,6 +35,10 @@ class StaticsSpec(Table):
         'one of "report", "stop", "follow"; what to do where equilibria lose their stability', "report"
     )
 
+    after_limit: Annotated[str, one_of(lambda: ("stop", "dynamics"), "an answer")] = key(
+        'one of "stop", "dynamics"; what to do where the path ends', "stop"
+    )
+
     @model_validator(mode="before")
     @classmethod
     def _default_steps(cls, data: Any) -> Any:
@@ -51,6 +55,14 @@ class StaticsSpec(Table):
                 f"{' and '.join(given)} given",
                 at=[given[1]],
                 expected="one of steps, times, strokes",
+                cure="drop one",
+            )
+        if self.after_limit != "stop" and self.control != "load":
+            raise problem(
+                "arc_length goes past limits by itself",
+                at=["after_limit"],
+                got=self.after_limit,
+                expected='"stop", or control = "load"',
                 cure="drop one",
             )
         _rising(self.times or (), "times")

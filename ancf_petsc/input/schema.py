@@ -26,6 +26,7 @@ from ancf_petsc.input.types import (
     Count,
     Direction,
     DirectionKey,
+    Fixed,
     Name,
     Points,
     RampKey,
@@ -149,7 +150,7 @@ class ConstraintSpec(Table):
     """One [[constraint]]: components held (fix) and driven (move) of a group, and of its nodes' slopes held (slopes)."""
 
     group: Name = key("a group's name in quotes; of the mesh file or of [groups]")
-    fix: Axes = key('a list out of "x", "y", "z"; such as ["x", "y"]', ())
+    fix: Fixed = key('a list out of "x", "y", "z" and "normal"; such as ["x", "y"]', ())
     move: dict[Axis, float] = key("displacements by axis; such as { z = -0.025 }", {})
     slopes: Axes = key('a list out of "x", "y", "z"; components of the slopes to hold, such as ["z"]', ())
     ramp: RampKey = key('a ramp; such as "cosine"', "linear")

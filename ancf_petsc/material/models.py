@@ -23,7 +23,7 @@ the misprint of (9) mended (docs/theory.md).
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import log, log1p, sqrt
+from math import log, log1p
 from typing import NamedTuple
 
 import numpy as np
@@ -53,8 +53,7 @@ SAME_STRAIN = 1e-6  # below it a correction of second order in the difference of
 class Law(NamedTuple):
     """A hyperelastic law: see the head of this module.
 
-    condenses: `plane_stress` and beams take its parameters. softest: in uniaxial strain the stress is smallest at this stretch and
-    grows again below, so that a body carries no more force there; None where there is no such stretch.
+    condenses: `plane_stress` and beams take its parameters.
     """
 
     name: str
@@ -66,7 +65,6 @@ class Law(NamedTuple):
     mean_stress: Callable | None = None
     mean_tangent: Callable | None = None
     condenses: bool = False
-    softest: float | None = None
 
 
 def lame_parameters(young: float, poisson: float) -> NDArray[np.float64]:
@@ -255,7 +253,6 @@ LAWS = {
             svk_mean_stress,
             svk_mean_tangent,
             condenses=True,
-            softest=sqrt(1.0 / 3.0),
         ),
         Law(
             "neo_hooke",

@@ -20,7 +20,11 @@ from ancf_petsc.parallel.exchange import combined
 
 
 class Assembly:
-    """Evaluates a model at states x, PETSc vectors of the owned nodal vectors."""
+    """Evaluates a model at states x, PETSc vectors of the owned nodal vectors.
+
+    start (n, 3): the undeformed state. States, forces and directions have the components of unknowns, see `model/frames`; what
+    `local` and `along_axes` give has those along the axes.
+    """
 
     def __init__(self, model: Model) -> None:
         self.model = model
@@ -29,6 +33,7 @@ class Assembly:
         self._positions = model.reference.copy()
         self._second = model.reference.copy()
         self._force = np.zeros_like(model.reference)
+        self.start = model.frames.to_frames(model.reference[:n].copy())
         self.driven = np.flatnonzero(model.drive[:n] >= 0)
         self.driven_by = model.drive[:n].ravel()[self.driven]
         self._ghosts = self._ghost_scatter()
@@ -42,12 +47,19 @@ class Assembly:
     def reference_vector(self) -> PETSc.Vec:
         """The undeformed state."""
         x = self.vector()
-        x.array[:] = self.model.reference[: self.model.owned].ravel()
+        x.array[:] = self.start.ravel()
         return x
 
+    def along_axes(self, field: NDArray) -> NDArray[np.float64]:
+        """A field (n, 3) of unknowns on owned nodal vectors with components along the axes; itself where there are no frames."""
+        return self.model.frames.to_axes(field.copy()) if self.model.frames else field
+
     def local(self, x: PETSc.Vec, into: NDArray | None = None) -> NDArray:
-        """Values (v, 3) of x at owned nodal vectors and ghosts; valid until the next call with the same `into`."""
-        values = self._positions if into is None else into
+        """Values (v, 3) of x at owned nodal vectors and ghosts, along the axes; valid until the next call with the same `into`."""
+        return self.model.frames.to_axes(self.spread(x, self._positions if into is None else into))
+
+    def spread(self, x: PETSc.Vec, values: NDArray) -> NDArray:
+        """Values (v, 3) of x at owned nodal vectors and ghosts, as they are. Collective."""
         values[: self.model.owned] = x.array_r.reshape(-1, 3)
         if self._ghosts is not None:
             scatter, ghosts, _ = self._ghosts
@@ -61,13 +73,12 @@ class Assembly:
             into[:] = field
             return into
         self._ghosts[2].array[:] = field.ravel()
-        return self.local(self._ghosts[2], into)
+        return self.spread(self._ghosts[2], into)
 
     def set_driven(self, x: PETSc.Vec, s: float) -> None:
         """Put the driven degrees of freedom of x where they belong at pseudo-time s."""
         values = np.array([drive.value(s) for drive in self.model.drives] or [0.0])
-        owned = self.model.reference[: self.model.owned].ravel()
-        x.array[self.driven] = owned[self.driven] + values[self.driven_by]
+        x.array[self.driven] = self.start.ravel()[self.driven] + values[self.driven_by]
 
     def external_force(self, s: float) -> NDArray:
         """Dead loads on the owned nodal vectors (n, 3) at pseudo-time s."""
@@ -93,7 +104,7 @@ class Assembly:
                 (positions,), self.model.tables, region.parameters, region.cells, force
             )
             smallest = min(smallest, found)
-        return force[: self.model.owned], smallest
+        return self.model.frames.to_frames(force[: self.model.owned]), smallest
 
     def mean_force(self, x0: PETSc.Vec, x1: PETSc.Vec) -> tuple[NDArray, float]:
         """Forces (n, 3) between two states whose work is exactly the growth of the energy, and the smallest det F1."""
@@ -107,7 +118,7 @@ class Assembly:
                 states, self.model.tables, region.parameters, region.cells, force
             )
             smallest = min(smallest, found)
-        return force[: self.model.owned], smallest
+        return self.model.frames.to_frames(force[: self.model.owned]), smallest
 
     def _two_states(self, x0: PETSc.Vec, x1: PETSc.Vec) -> tuple[NDArray, NDArray]:
         return self.local(x0, into=self._second), self.local(x1)
@@ -132,7 +143,7 @@ class Assembly:
         force = np.zeros_like(positions)
         for region in self.model.regions:
             region.kernels.tangent_product(fields, self.model.tables, region.parameters, region.cells, force)
-        return force[: self.model.owned]
+        return self.model.frames.to_frames(force[: self.model.owned])
 
     def fields(self, x: PETSc.Vec) -> Means:
         """Green-Lagrange strain (e, 9), Cauchy stress (e, 9) and det F (e,) of this rank's cells."""

@@ -106,9 +106,9 @@ class Body:
         """The owned nodal vectors that are positions."""
         return np.flatnonzero(self.slots[: self.owned] == 0)
 
-    def mapped(self, values: NDArray) -> Floats:
-        """Functions (e, a) of the nodal vectors of all cells from those of the reference cell (a,)."""
-        return map_functions(values, self.slope_maps, self.element)
+    def mapped(self, values: NDArray, cells: NDArray | slice = slice(None)) -> Floats:
+        """Functions (e, a) of the nodal vectors of cells, all by default, from those of the reference cell (a,)."""
+        return map_functions(values, self.slope_maps[cells], self.element)
 
     @property
     def slope_maps(self) -> Floats:

@@ -69,10 +69,12 @@ class Mass:
         return combined(self.comm, low, MPI.MIN), combined(self.comm, high, MPI.MAX)
 
     def times(self, field: NDArray, into: NDArray | None = None) -> NDArray[np.float64]:
-        """Mass times a field (n, 3) on owned nodal vectors; driven ones are no exception. Collective."""
+        """Mass times a field (n, 3) of unknowns on owned nodal vectors; driven ones are no exception. Collective."""
+        frames = self.assembly.model.frames
         result = np.empty((self.assembly.model.owned, 3)) if into is None else into
-        mass_product(*self.assembly.graph, self.values, self.assembly.with_ghosts(field, self._field), result)
-        return result
+        local = frames.to_axes(self.assembly.with_ghosts(field, self._field))
+        mass_product(*self.assembly.graph, self.values, local, result)
+        return frames.to_frames(result)
 
     def add_to(self, matrix: Matrix, factor: float = 1.0) -> None:
         """Add factor times the mass to a matrix that is not finished yet."""
@@ -87,9 +89,9 @@ class Mass:
 
         Around a body of revolution all but the linear one along the axis cancels.
         """
-        carried = self.times(velocity)
+        carried = self.assembly.along_axes(self.times(velocity))
         linear = carried[self.assembly.model.own_positions].sum(axis=0)
-        moments = x.array_r.reshape(-1, 3).T @ carried
+        moments = self.assembly.along_axes(x.array_r.reshape(-1, 3)).T @ carried
         angular = np.array([moments[i, j] - moments[j, i] for i, j in ((1, 2), (2, 0), (0, 1))])
         both = combined(self.comm, np.concatenate((linear, angular)))
         revolution = self.assembly.model.revolution
@@ -102,7 +104,7 @@ class Mass:
         model = self.assembly.model
         uniform = np.zeros((model.owned, 3))
         uniform[model.own_positions] = 1.0
-        share = self.times(uniform)[:, 0]
+        share = self.assembly.along_axes(self.times(model.frames.to_frames(uniform)))[:, 0]
         moment = share @ model.reference[: model.owned]
         total = share[model.own_positions].sum()
         sums = combined(self.comm, np.append(moment, total))

@@ -17,6 +17,7 @@ from petsc4py import PETSc
 from ancf_petsc.algebra.graph import block_starts
 from ancf_petsc.kernel.constant import add_mass_blocks
 from ancf_petsc.kernel.interface import Target
+from ancf_petsc.model.frames import TurnedBlocks
 from ancf_petsc.model.model import Model
 from ancf_petsc.parallel.exchange import combined
 
@@ -61,6 +62,19 @@ class Layout:
         self.driven_bits = model.driven_bits()
         self.driven = np.flatnonzero(model.drive[:n] >= 0)
         self.diagonal = self._diagonal()
+        self.turned = TurnedBlocks(model.frames, self._blocks(), model.drive >= 0) if model.frames else None
+
+    def _blocks(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+        """Rows, columns, first places and strides (b,) of all blocks, columns of local nodal vectors."""
+        parts = []
+        for side, (pointers, columns) in enumerate((self.rows[:2], self.rows[2:4])):
+            counts = np.diff(pointers)
+            rows = np.repeat(np.arange(len(counts)), counts)
+            within = np.arange(len(columns)) - pointers[rows]
+            starts = side * self.rows.split + 9 * pointers[rows] + 3 * within
+            parts.append((rows, columns, starts, 3 * counts[rows]))
+        rows, columns, starts, strides = (np.concatenate(both) for both in zip(*parts, strict=True))
+        return rows, columns, starts, strides
 
     def _diagonal(self) -> Integers:
         pointers, columns = self.rows.own_pointers, self.rows.own_columns
@@ -82,6 +96,7 @@ class Matrix:
         self.comm = layout.model.comm
         self.values = np.zeros(layout.size)
         self.largest_diagonal = 0.0
+        self._added: NDArray | None = None
         self.mat = self._share()
         self.mat.setBlockSize(3)  # petsc4py leaves it out where arrays are shared
         if symmetric:
@@ -97,6 +112,7 @@ class Matrix:
     def clear(self) -> None:
         """Begin anew: all numbers are zero."""
         self.values[:] = 0.0
+        self._added = None
 
     def add_mass(self, mass: NDArray, factor: float) -> None:
         """Add factor times a mass, one number per entry of the layout's graph; driven degrees of freedom get none."""
@@ -105,12 +121,13 @@ class Matrix:
         add_mass_blocks(self.layout.graph, mass, factor, places, self.values)
 
     def add_diagonal(self, diagonal: NDArray) -> None:
-        """Add numbers (3 n,) to the diagonal of the owned degrees of freedom."""
-        self.values[self.layout.diagonal] += diagonal
+        """Add numbers (3 n,) to the diagonal of the owned degrees of freedom, when the matrix is finished."""
+        self._added = diagonal if self._added is None else self._added + diagonal
 
     def finish(self) -> None:
         """Put one number on the diagonal of all driven degrees of freedom, the mean of the others. Collective."""
         places, driven = self.layout.diagonal, self.layout.driven
+        self._turn()
         diagonal = self.values[places]
         free = np.ones(len(diagonal), bool)
         free[driven] = False
@@ -119,10 +136,23 @@ class Matrix:
         self.largest_diagonal = combined(self.comm, largest, MPI.MAX)
         mean = total / count if count and total > 0.0 else self.largest_diagonal or 1.0
         self.values[places[driven]] = mean
-        self.close()
+        self._show()
 
     def close(self) -> None:
-        """Let PETSc see the numbers as they are: driven degrees of freedom keep an empty diagonal. Collective."""
+        """Finish, but leave the diagonal of driven degrees of freedom empty. Collective."""
+        self._turn()
+        self._show()
+
+    def _turn(self) -> None:
+        """Blocks along the axes become those of degrees of freedom."""
+        if self.layout.turned is not None:
+            self.layout.turned.turn(self.values)
+        if self._added is not None:
+            self.values[self.layout.diagonal] += self._added
+            self._added = None
+
+    def _show(self) -> None:
+        """Let PETSc see the numbers. Collective."""
         self.mat.stateIncrease()
         self.mat.assemble()
 

@@ -12,14 +12,14 @@ from ancf_petsc.parallel.exchange import combined
 
 def reaction(assembly: Assembly, out_of_balance: NDArray, group: str) -> NDArray[np.float64]:
     """Sum (3,) over the group's nodes of Q - Q_e: what the support exerts on the body."""
-    own = out_of_balance[assembly.model.groups[group]].sum(axis=0)
+    own = assembly.along_axes(out_of_balance)[assembly.model.groups[group]].sum(axis=0)
     return combined(assembly.comm, own)
 
 
 def mean_position(assembly: Assembly, x: PETSc.Vec, name: str) -> tuple[NDArray, NDArray]:
     """Weighted mean position (3,) of a group's nodes, in the file's coordinates, and its displacement (3,)."""
     vectors, weights = assembly.model.means[name]
-    now = weights @ x.array_r.reshape(-1, 3)[vectors]
+    now = weights @ assembly.along_axes(x.array_r.reshape(-1, 3))[vectors]
     before = weights @ assembly.model.reference[vectors]
     now, before = combined(assembly.comm, np.stack((now, before)))
     return now + assembly.model.origin, now - before
@@ -45,7 +45,7 @@ def conjugates(assembly: Assembly, x: PETSc.Vec, out_of_balance: NDArray) -> tup
     model = assembly.model
     values = out_of_balance.ravel()[assembly.driven]
     reactions = np.bincount(assembly.driven_by, values, minlength=len(model.drives))
-    displacement = x.array_r.reshape(-1, 3) - model.reference[: model.owned]
+    displacement = x.array_r.reshape(-1, 3) - assembly.start
     seen = np.array([float((load.pattern * displacement).sum()) for load in model.loads])
     both = combined(assembly.comm, np.concatenate((reactions, seen)))
     return both[: len(model.drives)], both[len(model.drives) :]

@@ -70,6 +70,20 @@ class PathWork:
             self.total = self._before + sum(self._increment(k) for k in range(1, newest + 1))
             self._settled = newest == POINTS - 1
 
+    def jump(self, s: float, reactions: NDArray, displacements: NDArray) -> float:
+        """Go on to the state at s which the body has come to under the loads and moves of s; the path begins anew there. Returns
+        the work in between: moves come first, against the reactions before.
+        """
+        before, reactions_before, seen_before, _ = self._states[-1]
+        work = 0.0
+        for m, drive in enumerate(self.drives):
+            work += drive.amplitude * (drive.ramp.value(s) - drive.ramp.value(before)) * reactions_before[m]
+        for number, load in enumerate(self.loads):
+            work += load.ramp.value(s) * (displacements[number] - seen_before[number])
+        self.total += work
+        self.start(s, reactions, displacements)
+        return work
+
     def _increment(self, k: int) -> float:
         """Work between states k - 1 and k."""
         times = [state[0] for state in self._states]

@@ -34,7 +34,8 @@ class Leap(NamedTuple):
 def compiled_motion(equations: Equations) -> CompiledMotion | None:
     """For one rank, one material, an element with such kernels, nothing driven along, a mass that is factored; else None."""
     model = equations.assembly.model
-    simple = equations.comm.size == 1 and len(model.regions) == 1 and not equations.is_driven
+    simple = equations.comm.size == 1 and len(model.regions) == 1
+    simple = simple and not equations.is_driven and not model.frames
     fits = simple and kernel_set(model.element).force_of_all is not None and equations.solver.is_factored
     return CompiledMotion(equations) if fits else None
 

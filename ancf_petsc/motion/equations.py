@@ -64,8 +64,8 @@ class Equations:
     def driven_positions(self, t: float) -> NDArray[np.float64]:
         """Of the driven degrees of freedom (c,), in the order of `assembly.driven`."""
         values = [drive.value(t / self.duration) for drive in self.assembly.model.drives]
-        reference = self.assembly.model.reference.ravel()[self.assembly.driven]
-        return reference + np.array(values or [0.0])[self.assembly.driven_by]
+        start = self.assembly.start.ravel()[self.assembly.driven]
+        return start + np.array(values or [0.0])[self.assembly.driven_by]
 
     def driven_velocities(self, t: float) -> NDArray[np.float64]:
         """Of the driven degrees of freedom (c,); at the end of a smooth piece those it ends with."""

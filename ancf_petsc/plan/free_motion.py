@@ -16,6 +16,7 @@ def free_motions(
     *,
     slopes: NDArray | None = None,
     lacking: NDArray[np.bool_] | None = None,
+    frames: tuple[NDArray, NDArray] | None = None,
 ) -> dict[int, list[str]]:
     """Names of the free rigid motions of each piece that has some.
 
@@ -23,11 +24,12 @@ def free_motions(
     (v,) bool which are slopes, default none. A motion is free if it moves no driven degree of freedom: the null space of the
     6 x 6 Gram matrix of the motions at the driven degrees of freedom. Rotations are scaled by the size of the piece, slopes to
     length 1. lacking (6,): motions that are no rigid ones of the body, translations before rotations, such as those out of a plane.
+    frames: index (v,) into axes (k, 3, 3), whose columns are the directions of a vector's degrees of freedom; -1: the axes.
     """
     slopes = np.zeros(len(vectors), bool) if slopes is None else slopes
     found = {}
     others = np.zeros(6) if lacking is None else lacking.astype(float)
-    for label, gram, centre, size in _gram_matrices(vectors, driven, piece, pieces, slopes):
+    for label, gram, centre, size in _gram_matrices(vectors, driven, piece, pieces, slopes, frames):
         values, vectors = np.linalg.eigh(gram + np.diag(others))
         null = vectors[:, values <= 1e-12 * max(np.trace(gram), others.sum(), 1e-300)]
         if null.shape[1]:
@@ -35,7 +37,16 @@ def free_motions(
     return found
 
 
-def _gram_matrices(vectors, driven, piece, pieces, slopes):
+def directions(frames: tuple[NDArray, NDArray] | None, rows: NDArray, component: NDArray) -> NDArray:
+    """Unit vectors (m, 3) along which components (m,) of nodal vectors (m,) are degrees of freedom."""
+    found = np.eye(3)[component]
+    if frames is not None and len(frames[1]):
+        framed = frames[0][rows] >= 0
+        found[framed] = frames[1][frames[0][rows[framed]], :, component[framed]]
+    return found
+
+
+def _gram_matrices(vectors, driven, piece, pieces, slopes, frames):
     """Label, Gram matrix, centre and size of each piece."""
     used = piece >= 0
     at = used & ~slopes
@@ -50,11 +61,9 @@ def _gram_matrices(vectors, driven, piece, pieces, slopes):
     grams = np.zeros((pieces, 6, 6))
     for i in range(3):
         rows = np.flatnonzero(driven[:, i] & used)
-        modes = np.zeros((len(rows), 6))
-        modes[:, i] = ~slopes[rows]
+        along = directions(frames, rows, np.full(len(rows), i))
         scaled = arm[rows] / size[piece[rows], None]
-        j, k = (i + 1) % 3, (i + 2) % 3
-        modes[:, 3 + j], modes[:, 3 + k] = scaled[:, k], -scaled[:, j]
+        modes = np.hstack((along * ~slopes[rows, None], np.cross(scaled, along)))
         np.add.at(grams, piece[rows], modes[:, :, None] * modes[:, None, :])
     return [(label, grams[label], centre[label], size[label]) for label in range(pieces)]
 

@@ -20,6 +20,8 @@ from ancf_petsc.post.panels import (
     Runs,
     common_units,
     draw,
+    draw_cuts,
+    draw_end,
     draw_levels,
     finish,
     panels,
@@ -84,7 +86,10 @@ def force_stroke(runs: Runs) -> Figure | None:
     with style():
         figure, (axes,) = panels(1)
         axes.axhline(0, color="#b0b0b0", linewidth=0.8)
-        draw(axes, curves, quantities, over="stroke", factor=-1.0 if compression else 1.0)
+        factor = -1.0 if compression else 1.0
+        draw(axes, curves, quantities, over="stroke", factor=factor)
+        for run in runs:
+            draw_end(axes, run, "force", over="stroke", factor=factor)
         words = ("compression", "compressive force") if compression else ("stroke", "force")
         axes.set_xlabel(with_unit(words[0], units.length))
         axes.set_ylabel(with_unit(words[1], units.force))
@@ -199,6 +204,9 @@ def steps(runs: Runs) -> Figure | None:
             counts = name == "newton_iterations"
             draw(axes, curves, {name: ""}, drawstyle="steps-pre" if counts else "default")
             axes.set_ylabel(words)
+            for run in runs:
+                draw_cuts(axes, run)
+                draw_end(axes, run, name)
             if counts:
                 axes.set_ylim(bottom=0)
                 axes.yaxis.set_major_locator(MaxNLocator(integer=True))

@@ -112,6 +112,46 @@ def draw_levels(axes: Axes, levels: Sequence[Level]) -> None:
         )
 
 
+def draw_end(
+    axes: Axes, run: Results | ReferenceCurve, name: str, *, over: str = "", factor: float = 1.0
+) -> None:
+    """Mark where a run ended early, and where it jumped, on the curve of a column."""
+    table, summary = run.curve, getattr(run, "summary", {})
+    if name not in table:
+        return
+    abscissa = factor * table[over] if over else time_of(table)
+    places = [(row, "jump") for row in np.flatnonzero(table.get("jumps", np.zeros(0)))]
+    kind = summary.get("end", {}).get("kind", "reached")
+    if kind != "reached":
+        places.append((len(abscissa) - 1, kind.replace("_", " ")))
+    for row, words in places:
+        at = (abscissa[row], factor * table[name][row] if over else table[name][row])
+        axes.plot(*at, marker="X", markersize=7, color="black", linestyle="", zorder=5)
+        axes.annotate(
+            words, at, xytext=(-6, 6), textcoords="offset points", fontsize=8, horizontalalignment="right"
+        )
+
+
+def draw_cuts(axes: Axes, run: Results | ReferenceCurve) -> None:
+    """Ticks at the foot of the axes where steps were cut or another way was taken."""
+    entries = getattr(run, "summary", {}).get("step_control", [])
+    times = [entry.get("pseudo_time", entry.get("time")) for entry in entries]
+    at = [time for time in dict.fromkeys(times) if time is not None]
+    if at:
+        axes.plot(
+            at, np.zeros(len(at)), marker="|", markersize=9, color=GREY, linestyle="",
+            transform=axes.get_xaxis_transform(), clip_on=False,
+        )  # fmt: skip
+        axes.annotate(
+            "| step control",
+            (0.01, 0.03),
+            xycoords="axes fraction",
+            fontsize=7.5,
+            color=GREY,
+            verticalalignment="bottom",
+        )
+
+
 def time_of(table: Curves) -> Columns:
     return table["time"] if "time" in table else table["pseudo_time"]
 

@@ -22,13 +22,15 @@ from petsc4py import PETSc
 from ancf_petsc.errors import Interrupted, NoEquilibrium
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.parallel.fields import field
+from ancf_petsc.solve.cause import cause_of
 from ancf_petsc.solve.critical import CLOSE, Watch
 from ancf_petsc.solve.cubic import crossing, cubic, extreme
-from ancf_petsc.solve.events import CriticalPoint, place_of
+from ancf_petsc.solve.events import CriticalPoint, ended_at, place_of
 from ancf_petsc.solve.extrapolation import filled
-from ancf_petsc.solve.load_path import LONGEST_FIRST_STEP, SAME_TIME, Marks, PathStep
+from ancf_petsc.solve.load_path import LONGEST_FIRST_STEP
+from ancf_petsc.solve.marks import SAME_TIME, Marks, PathStep
 from ancf_petsc.solve.newton import Newton
-from ancf_petsc.solve.stability import why_it_ends
+from ancf_petsc.solve.stability import Last, why_it_ends
 
 WANTED, MOST_ITERATIONS, MOST_STEPS = 4, 12, 5000
 STRAIGHT, SHARPEST = 0.95, 0.7
@@ -147,7 +149,8 @@ class ArcLength:
                     break
                 reason = "the path turns too sharply in it"
             if self._size / 2 < self.smallest_step:
-                raise why_it_ends(self.newton, self.x, self.s, reason, self.smallest_step)
+                end = Last(self.s, self.x, reason, self.smallest_step, np.inf, (self.s, self.x))
+                raise why_it_ends(self.newton, self.watch, end)
             self._size /= 2
             log.info("  step by arc length failed (%s): halved to %.3g", reason, self._size)
             self.newton.control.note("halved", reason, here.s, self._size)
@@ -283,13 +286,13 @@ class ArcLength:
         stop = self.on_bifurcation == "stop"
         done = "the path ends here, as statics.on_bifurcation asks" if stop else "the path goes straight on"
         place = place_of(self.assembly, self.watch.lowest.mode)
-        event = CriticalPoint(
-            "bifurcation", (here.s + there.s) / 2, (here.s, there.s), there.negative, *place, done
-        )
+        cause = cause_of(self.assembly, here.x, self.watch.lowest.mode)
+        middle, between = (here.s + there.s) / 2, (here.s, there.s)
+        event = CriticalPoint("bifurcation", middle, between, there.negative, *place, done, cause.kind)
         self.newton.set_pseudo_time(here.s)
         self.on_event(event, here.x)
         if stop:
-            raise NoEquilibrium(event.words(), {"kind": "lost_definiteness"})
+            raise ended_at(event, cause)
 
     def _outputs_between(self, here: Point, there: Point) -> None:
         """Equilibria at exactly the outputs' pseudo-times between two points, in the order of the path."""

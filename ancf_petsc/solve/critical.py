@@ -77,11 +77,12 @@ class Watch:
     @property
     def share(self) -> float:
         """The last lowest eigenvalue over the largest so far."""
-        largest = self._largest
+        largest = self.largest
         return self.history[-1][1] / largest if self.history and largest > 0.0 else 1.0
 
     @property
-    def _largest(self) -> float:
+    def largest(self) -> float:
+        """The largest lowest eigenvalue so far."""
         return max((value for _, value in self.history), default=0.0)
 
     def begin(self, s: float) -> bool:
@@ -130,7 +131,7 @@ class Watch:
         """Negative pivots of the tangent held, its lowest eigenvalue being `value`; None where nobody can count them.
         None are counted where all of them are 0 but for rounding.
         """
-        if abs(value) <= NEUTRAL * self._largest:
+        if abs(value) <= NEUTRAL * self.largest:
             return 0
         pivots = self.newton.linear.negative_pivots()
         if pivots is None and value > 0.0:
@@ -150,7 +151,7 @@ class Watch:
         """
         lowest = self.lowest
         lowest.restart()
-        self.newton.tangent_at(x, SHIFT * self._largest * lowest.scale)
+        self.newton.tangent_at(x, SHIFT * self.largest * lowest.scale)
         lowest.look(CLOSE)
 
     def locate(self, before: Known, after: Known) -> tuple[Known, Known, float]:

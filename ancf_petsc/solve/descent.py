@@ -65,10 +65,10 @@ class _Potential:
 
     def energy(self, x: PETSc.Vec) -> float:
         """inf where a cell is inside out."""
-        model, comm = self.assembly.model, self.assembly.comm
+        comm = self.assembly.comm
         if not self.assembly.smallest_det(x) > 0.0:
             return np.inf
-        moved = x.array_r.reshape(-1, 3) - model.reference[: model.owned]
+        moved = x.array_r.reshape(-1, 3) - self.assembly.start
         return self.assembly.strain_energy(x) - combined(comm, float(np.vdot(self._load, moved)))
 
     def follow_mode(self, x: PETSc.Vec, mode: NDArray) -> None:

@@ -16,6 +16,7 @@ from ancf_petsc.errors import NoEquilibrium
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.parallel.exchange import combined
 from ancf_petsc.parallel.fields import field
+from ancf_petsc.solve.cause import Cause, cause_of
 from ancf_petsc.solve.critical import Known, Watch
 from ancf_petsc.solve.descent import stable_neighbour
 from ancf_petsc.solve.extrapolation import filled
@@ -33,7 +34,7 @@ class CriticalPoint:
 
     kind: bifurcation, limit point or loss of stability. negative: directions in which the state that showed it is
     unstable, None if nobody counted. place, direction (3,): where the mode moves most, undeformed and in the file's
-    coordinates, and whither. advice: what was done, or can be.
+    coordinates, and whither. done: what was done. cause: what loses its stability, see `Cause`; None where nobody looked.
     """
 
     kind: str
@@ -43,6 +44,7 @@ class CriticalPoint:
     place: tuple[float, ...]
     direction: tuple[float, ...]
     done: str
+    cause: str | None = None
 
     def words(self) -> str:
         """One line."""
@@ -73,7 +75,7 @@ class Crossing:
         self.watch, self.policy, self.on_event = watch, policy, on_event
         self.newton, self.model = watch.newton, watch.newton.assembly.model
         self._stable: Known | None = None
-        self._ends: CriticalPoint | None = None
+        self._ends: NoEquilibrium | None = None
         self._followed = False
 
     def judge(
@@ -129,7 +131,7 @@ class Crossing:
     def stop_if_asked(self) -> None:
         """Raise NoEquilibrium where the path was to end at a critical point, and has reached it."""
         if self._ends is not None:
-            raise NoEquilibrium(self._ends.words(), {"kind": "lost_definiteness"})
+            raise self._ends
 
     def limit_point(self, s: float, x: PETSc.Vec, smallest: float) -> CriticalPoint | None:
         """The limit point that a path ends at, if the lowest eigenvalue falls to 0 over its last states as it does there:
@@ -168,17 +170,19 @@ class Crossing:
         watch.find_mode(near.x)
         kind = "bifurcation" if self._along(near.x, start, target) <= ACROSS else "loss of stability"
         mode = watch.lowest.mode.copy()
+        cause = cause_of(newton.assembly, near.x, mode)
         found, done = (target, trial), "the path goes on with unstable states"
         if self.policy == "stop":
             done = 'the path ends here, as statics.on_bifurcation = "stop" asks'
         elif self.policy == "follow":
             entered = min(target, max(where, s) + max(BEYOND * (where - start), 1e-6))
             found, done = self._branch(entered, before, after, mode, (target, trial))
-        event = CriticalPoint(kind, where, (before.s, after.s), count, *place_of(newton.assembly, mode), done)
+        place = place_of(newton.assembly, mode)
+        event = CriticalPoint(kind, where, (before.s, after.s), count, *place, done, cause.kind)
         newton.set_pseudo_time(near.s)
         self.on_event(event, near.x)
         if self.policy == "stop":
-            self._ends = event
+            self._ends = ended_at(event, cause)
             if before.s <= s:
                 self.stop_if_asked()
             found = before.s, before.x.copy()
@@ -199,7 +203,7 @@ class Crossing:
             x.scale(1.0 - part)
             x.axpy(part, after.x)
         self.newton.assembly.set_driven(x, s)
-        found = stable_neighbour(self.newton, self.watch, s, x, self._signed(mode))
+        found = stable_neighbour(self.newton, self.watch, s, x, signed(self.newton.assembly, mode))
         if found is None:
             x.destroy()
             return unstable, "no stable state was found beside it: the path goes on with unstable ones"
@@ -218,23 +222,31 @@ class Crossing:
         increment.destroy()
         return abs(both) / np.sqrt(one * other) if one * other > 0.0 else 0.0
 
-    def _signed(self, mode: NDArray) -> NDArray:
-        """The mode with the sign that its place and direction say."""
-        own = self.model.own_positions
-        _, along = place_of(self.newton.assembly, mode)
-        place = int(np.argmax(np.linalg.norm(mode[own], axis=1))) if len(own) else -1
-        best = (0.0, 1.0)
-        if place >= 0:
-            v = mode[own[place]]
-            best = (float(np.linalg.norm(v)), float(np.sign(v @ np.array(along)) or 1.0))
-        return mode * max(self.newton.comm.allgather(best), key=lambda item: item[0])[1]
+
+def signed(assembly: Assembly, mode: NDArray) -> NDArray:
+    """The mode (n, 3) with the sign that its place and direction say. Collective."""
+    own = assembly.model.own_positions
+    _, along = place_of(assembly, mode)
+    moved = assembly.along_axes(mode)
+    place = int(np.argmax(np.linalg.norm(moved[own], axis=1))) if len(own) else -1
+    best = (0.0, 1.0)
+    if place >= 0:
+        v = moved[own[place]]
+        best = (float(np.linalg.norm(v)), float(np.sign(v @ np.array(along)) or 1.0))
+    return mode * max(assembly.comm.allgather(best), key=lambda item: item[0])[1]
+
+
+def ended_at(event: CriticalPoint, cause: Cause) -> NoEquilibrium:
+    """The end of a path that was to end at a critical point."""
+    words = "; ".join(filter(None, (event.words(), cause.words())))
+    return NoEquilibrium(words, {**cause.facts(), "kind": cause.kind})
 
 
 def place_of(assembly: Assembly, mode: NDArray) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Where a mode (n, 3) moves most, undeformed and in the file's coordinates, and the unit vector along which. Of places
     that differ by rounding, the first of the file. Collective.
     """
-    model, comm = assembly.model, assembly.comm
+    model, comm, mode = assembly.model, assembly.comm, assembly.along_axes(mode)
     own = model.own_positions
     size = np.linalg.norm(mode[own], axis=1)
     largest = combined(comm, float(size.max(initial=0.0)), MPI.MAX)

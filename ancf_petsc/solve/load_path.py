@@ -7,21 +7,24 @@ that fails is halved, one that converges quickly lets the next grow; outputs and
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from math import ceil, isclose
 from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
-from ancf_petsc.errors import Interrupted
+from ancf_petsc.errors import Interrupted, NoEquilibrium
 from ancf_petsc.parallel.fields import field
 from ancf_petsc.solve.critical import Watch
 from ancf_petsc.solve.events import CriticalPoint, Crossing
 from ancf_petsc.solve.extrapolation import Extrapolation
+from ancf_petsc.solve.marks import Jump, Marks, PathStep
 from ancf_petsc.solve.newton import Newton, Outcome
-from ancf_petsc.solve.stability import why_it_ends
+from ancf_petsc.solve.settle import settle
+from ancf_petsc.solve.stability import Last, why_it_ends
+from ancf_petsc.solve.step_control import StepControl
 
 LONGEST_FIRST_STEP = 0.1
 QUICK, SLOW = 5, 9
@@ -29,56 +32,20 @@ FAR, FASTER, NEAR = 1.0, 3.0, 0.01
 """What is looked at by a step back: states farther from the predicted one than that is away, and steps that move the body so
 many times faster than the one before; both if it is more than this part of its size.
 """
+FINER, MOST_TRIALS = 256, 25
+"""Where a path ends: how many times shorter steps are tried, and how many."""
+MOST_JUMPS, AFTER_JUMP = 100, 0.01
+"""Of damped motion on one path, and the first step after one."""
 SAME_STATE = 1e-3
-SAME_TIME = 1e-9
-"""Pseudo-times closer than this are one."""
 log = logging.getLogger("ancf")
-
-
-@dataclass(frozen=True)
-class PathStep:
-    """An accepted step of the path. length: of the path so far, where it is followed by its length. output: asked for."""
-
-    s: float
-    size: float
-    newton: int
-    linear: int
-    residuals: tuple[float, ...]
-    output: bool = False
-    length: float | None = None
-
-
-@dataclass(frozen=True)
-class Marks:
-    """Where a path goes. outputs: pseudo-times to hit exactly, ascending, the last is 1. corners: where it is not smooth."""
-
-    outputs: tuple[float, ...]
-    corners: frozenset[float]
-
-    @staticmethod
-    def of(outputs: Sequence[float], corners: Sequence[float]) -> Marks:
-        """Times that differ by rounding are one: an output's, where there is one."""
-        times: list[float] = []
-        for s in sorted({*outputs, 1.0}, reverse=True):
-            if not times or times[-1] - s > SAME_TIME:
-                times.append(s)
-        times.reverse()
-        found: set[float] = set()
-        for corner in sorted(corners):
-            near = min((*times, *found), key=lambda s: abs(s - corner))
-            found.add(near if abs(near - corner) <= SAME_TIME else corner)
-        return Marks(tuple(times), frozenset(found))
-
-    def after(self, s: float) -> float:
-        """The next of them."""
-        return min(mark for mark in (*self.outputs, *self.corners) if mark > s)
 
 
 class LoadPath:
     """Moves a state along the path. `on_step(step, x)` is called after each accepted step.
 
     start: the state at s = 0, default the undeformed one. watch: looks for critical points; `on_event(event, x)` is
-    called at each. on_bifurcation: what to do there: report, stop or follow.
+    called at each. on_bifurcation: what to do there: report, stop or follow. on_jump: where the path ends, damped motion carries
+    the body on, and `on_jump(jump, before, x)` is called with the states before and after; None ends the run there.
     """
 
     def __init__(
@@ -92,6 +59,7 @@ class LoadPath:
         start: PETSc.Vec | None = None,
         on_bifurcation: str = "report",
         on_event: Callable[[CriticalPoint, PETSc.Vec], None] = lambda event, x: None,
+        on_jump: Callable[[Jump, PETSc.Vec, PETSc.Vec], None] | None = None,
     ) -> None:
         self.newton = newton
         self.assembly = newton.assembly
@@ -99,10 +67,12 @@ class LoadPath:
         self.smallest_step = smallest_step
         self.on_step = on_step
         self.interrupted = interrupted
+        self.on_jump, self._jumps = on_jump, 0
         self.s = 0.0
         self.x = start or self.assembly.reference_vector()
         self.watch = Watch(newton)
         self._crossing = Crossing(self.watch, on_bifurcation, on_event)
+        self._trying = False  # a path that only looks how far it leads: nothing is judged or said
         self._rate = np.inf  # of the last step: largest change of a component over that of s
         self._at_hand = False  # whether the linear solver holds a tangent of the last trial
         self._past = Extrapolation()
@@ -117,6 +87,7 @@ class LoadPath:
             "rate": self._rate,
             "at_hand": self._at_hand,
             "step": self._step,
+            "jumps": self._jumps,
             "past": self._past.state(),
             "watch": self.watch.state(),
             "crossing": self._crossing.state(),
@@ -127,7 +98,7 @@ class LoadPath:
         """Go on from a state. Collective."""
         self.newton.restore(state["newton"])
         self.s, self._rate, self._at_hand = state["s"], state["rate"], state["at_hand"]
-        self._step = state["step"]
+        self._step, self._jumps = state["step"], state["jumps"]
         self.x.array[:] = state["x"].ravel()
         self._past.restore(state["past"], self.x)
         self.watch.restore(state["watch"])
@@ -151,9 +122,13 @@ class LoadPath:
             trial, outcome = self._attempt(target)
             if not outcome.converged:
                 trial.destroy()
-                self._shorten(target, outcome.reason)
+                if self._shorten(target, outcome.reason):
+                    return
                 continue
             at_output = target in self.marks.outputs
+            found: tuple[float, PETSc.Vec] | None = (target, trial)
+            if self._trying:
+                break
             found = self._crossing.judge(
                 self.s,
                 target,
@@ -168,6 +143,7 @@ class LoadPath:
             self._step = (target - self.s) / 4
             log.info("  step to s = %.6g led to an unstable state: shortened", target)
             self.newton.control.note("shortened", "it led to an unstable state", self.s, self._step)
+        assert found is not None
         s, x = found
         step = PathStep(
             s, s - self.s, outcome.newton, outcome.linear, outcome.residuals, s in self.marks.outputs
@@ -177,18 +153,77 @@ class LoadPath:
         self.on_step(step, self.x)
         self._crossing.stop_if_asked()
 
-    def _shorten(self, target: float, reason: str) -> None:
-        """After a step that failed: another linear solver, half the step, or the end of the path."""
+    def _shorten(self, target: float, reason: str) -> bool:
+        """After a step that failed: another linear solver, half the step, or the end of the path. Returns whether damped motion
+        went on from there.
+        """
         linear, size = self.newton.linear, (target - self.s) / 2
         if linear.gave_up() and (linear.is_cheap_to_factor or size < self.smallest_step):
             self.newton.factor_from_now_on(self.s)
-            return
+            return False
         if size < self.smallest_step:
-            limit = self._crossing.limit_point(self.s, self.x, self.smallest_step)
-            raise why_it_ends(self.newton, self.x, self.s, reason, self.smallest_step, limit)
+            if self._trying:
+                raise NoEquilibrium(reason)
+            self._jump(target, self._end(target, reason))
+            return True
         log.info("  step to s = %.6g failed (%s): halved to %.3g", target, reason, size)
         self.newton.control.note("halved", reason, self.s, size)
         self._step = size
+        return False
+
+    def _jump(self, target: float, why: NoEquilibrium) -> None:
+        """By damped motion to a state of rest at `target`. Raises NoEquilibrium where that is not asked for, or there is none."""
+        if self.on_jump is None:
+            raise why
+        if self._jumps >= MOST_JUMPS:
+            raise NoEquilibrium(f"{why}; damped dynamics went on {MOST_JUMPS} times before", why.facts)
+        x = self.x.copy()
+        self.assembly.set_driven(x, target)
+        found = settle(self.newton, self.watch, target, x, self.interrupted)
+        if found is None:
+            x.destroy()
+            nowhere = f"damped dynamics found no state of rest at pseudo-time {target:.6g} either"
+            raise NoEquilibrium(f"{why}; {nowhere}", why.facts)
+        before, was = self.x.copy(), self.s
+        self.watch.negative = 0
+        self.watch.history.append((target, found.lowest))
+        self._accept(target, x, branched=True)
+        self._crossing.remember(target, x)
+        self._step, self._jumps = max(self._step, AFTER_JUMP), self._jumps + 1
+        self.newton.control.note("dynamics", str(why), was)
+        self.on_jump(Jump(was, target, found.steps, why), before, x)
+        before.destroy()
+
+    def _end(self, target: float, reason: str) -> NoEquilibrium:
+        """What to say of a step to `target` that failed, as short as it may be."""
+        limit = self._crossing.limit_point(self.s, self.x, self.smallest_step)
+        beyond = self.try_beyond(target, self.smallest_step / FINER, MOST_TRIALS)
+        last = Last(self.s, self.x, reason, self.smallest_step, target, beyond, limit)
+        error = why_it_ends(self.newton, self.watch, last)
+        beyond[1].destroy()
+        return error
+
+    def try_beyond(self, target: float, least: float, most: int) -> tuple[float, PETSc.Vec]:
+        """How far a path from here leads towards `target` by steps down to `least`, and at most so many: pseudo-time and state."""
+        trial = LoadPath(
+            self.newton, Marks.of([target], tuple(self.marks.corners)), least, start=self.x.copy()
+        )
+        trial.s, trial._trying, trial._step = self.s, True, (target - self.s) / 4
+        trial._past.forget()
+        trial._past.add(self.s, trial.x)
+        control, self.newton.control = self.newton.control, StepControl()
+        try:
+            for _ in range(most):
+                trial._advance()
+                if trial.s >= target or self.interrupted():
+                    break
+        except NoEquilibrium:
+            pass
+        finally:
+            self.newton.control = control
+            trial.watch.destroy()
+            trial._past.forget()
+        return trial.s, trial.x
 
     def _target(self) -> float:
         """Where the next step ends: on the next mark, or on an equal part of the way to it."""

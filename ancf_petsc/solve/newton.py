@@ -199,7 +199,7 @@ class Newton:
         """
         values = self.assembly.vector()
         self._residual(self._snes, x, values)
-        scale, norm = self._force_scale(), values.norm()
+        scale, norm = self.force_scale(), values.norm()
         found = values.array_r.copy()
         values.destroy()
         return found, norm / scale if scale else 0.0
@@ -233,7 +233,7 @@ class Newton:
         residual = norms[2]
         if not np.isfinite(residual):
             return NOT_FINITE
-        scale = self._force_scale()
+        scale = self.force_scale()
         relative = residual / scale if scale else 0.0
         if iteration:
             self.linear.note_effort(self.linear.ksp.getIterationNumber(), self._term)
@@ -244,8 +244,10 @@ class Newton:
         self._term = self._forcing.term(relative)
         return Reason.ITERATING
 
-    def _force_scale(self) -> float:
-        """The largest of the norms of reactions and loads, and what rounding leaves of the tangent times the size."""
+    def force_scale(self) -> float:
+        """The largest of the norms of reactions and loads, and what rounding leaves of the tangent times the size; of the state
+        that forces were taken at last. Collective.
+        """
         reactions, loads = np.sqrt(combined(self.comm, np.array(self._supported)))
         floor = 1e-14 * self.matrix.largest_diagonal * self.assembly.model.size
         return max(reactions, loads, floor / self.tolerance)

@@ -164,6 +164,14 @@ def keep_preconditioner(snes: PETSc.SNES) -> None:
         library.SNESSetLagPreconditioner(ctypes.c_void_p(snes.handle), number(-1))
 
 
+def free_what_python_dropped(comm: MPI.Comm) -> None:
+    """Free PETSc's objects that nothing in Python refers to any more: petsc4py only lists them, as ranks drop them at different
+    times. Collective.
+    """
+    if hasattr(PETSc, "garbage_cleanup"):  # from 3.18 on
+        PETSc.garbage_cleanup(comm)
+
+
 def is_given(name: str) -> bool:
     """Whether the case or the command line says anything about an option. The question is no use of it."""
     return name in PETSc.Options().getAll()

@@ -10,7 +10,8 @@ from petsc4py import PETSc
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.model import Model
 from ancf_petsc.model.ramp import Ramp
-from ancf_petsc.solve.load_path import LoadPath, Marks, PathStep
+from ancf_petsc.solve.load_path import LoadPath
+from ancf_petsc.solve.marks import Marks, PathStep
 from ancf_petsc.solve.newton import Newton
 
 

@@ -11,10 +11,14 @@ from ancf_petsc.mesh.groups import describe_set
 from ancf_petsc.model.drive import HELD
 from ancf_petsc.plan.part import Part
 from ancf_petsc.plan.revolution import axis_group
-from ancf_petsc.plan.supports import displacement, held_slopes
+from ancf_petsc.plan.supports import displacement, held_slopes, normal
 from ancf_petsc.plan.supports.table import SupportTable
 
-KINDS: list[Callable[[ConstraintSpec, Part, SupportTable], None]] = [displacement.enter, held_slopes.enter]
+KINDS: list[Callable[[ConstraintSpec, Part, SupportTable], None]] = [
+    displacement.enter,
+    normal.enter,
+    held_slopes.enter,
+]
 """enter(spec, part, table): each looks for its own keys in one [[constraint]]."""
 
 

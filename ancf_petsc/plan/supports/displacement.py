@@ -12,6 +12,7 @@ from ancf_petsc.plan.supports.table import SupportTable
 def enter(spec: ConstraintSpec, part: Part, table: SupportTable) -> None:
     """Prescribe the components named."""
     ramp = part.ramps.of_support(spec.ramp)
-    drives = {AXES.index(axis): Drive(0.0, ramp) for axis in spec.fix}
+    drives = {AXES.index(axis): Drive(0.0, ramp) for axis in spec.fix if axis != "normal"}
     drives |= {AXES.index(axis): Drive(amount, ramp) for axis, amount in spec.move.items()}
-    table.prescribe(part.group(spec.group, f"constraint.{spec.group}.group"), drives)
+    if drives:
+        table.prescribe(part.group(spec.group, f"constraint.{spec.group}.group"), drives)

@@ -19,9 +19,17 @@ def refuse_free_motions(part: Part, table: SupportTable) -> None:
     space = part.space
     pieces, label = connected_pieces(space.cells, len(space.nodes))
     driven, nodes, slopes = table.drive >= 0, space.node_of(), space.slots() > 0
-    free = free_motions(space.reference(), driven, label[nodes], pieces, slopes=slopes, lacking=part.lacking)
+    free = free_motions(
+        space.reference(),
+        driven,
+        label[nodes],
+        pieces,
+        slopes=slopes,
+        lacking=part.lacking,
+        frames=(table.frame, table.axes),
+    )
     if not free:
-        _refuse_joints(part, driven, pieces)
+        _refuse_joints(part, table, pieces)
         return
     piece, names = next(iter(free.items()))
     where = ""
@@ -38,7 +46,7 @@ def refuse_free_motions(part: Part, table: SupportTable) -> None:
     )
 
 
-def _refuse_joints(part: Part, driven: NDArray, pieces: int) -> None:
+def _refuse_joints(part: Part, table: SupportTable, pieces: int) -> None:
     """The same for pieces that share edges or corners only: hinges and ball joints."""
     space = part.space
     if part.element.cell.dimension == 1:
@@ -52,7 +60,13 @@ def _refuse_joints(part: Part, driven: NDArray, pieces: int) -> None:
     vectors = np.repeat(space.first[node] - np.cumsum(sizes) + sizes, sizes) + np.arange(sizes.sum())
     belongs = np.stack([vectors, np.repeat(own, sizes)], axis=1)
     found = free_joints(
-        space.reference(), driven, belongs, count, slopes=space.slots() > 0, lacking=part.lacking
+        space.reference(),
+        table.drive >= 0,
+        belongs,
+        count,
+        slopes=space.slots() > 0,
+        lacking=part.lacking,
+        frames=(table.frame, table.axes),
     )
     if found is None:
         return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ancf_petsc.plan.free_motion import motion_names
+from ancf_petsc.plan.free_motion import directions, motion_names
 
 MOST_PIECES = 200
 """More are not looked at: the matrix of their motions is full."""
@@ -21,12 +21,13 @@ def free_joints(
     *,
     slopes: NDArray,
     lacking: NDArray | None = None,
+    frames: tuple[NDArray, NDArray] | None = None,
 ) -> tuple[int, list[str]] | None:
     """The piece that can move most though joints and supports hold it, and the names of its motions; None where none can.
 
     vectors (v, 3) undeformed positions and slopes, driven (v, 3) bool, slopes (v,) bool which are slopes.
     belongs (m, 2): vector and piece, each pair once; a vector of several pieces joins them: it moves with all.
-    lacking (6,): as `free_motions` has it.
+    lacking (6,), frames: as `free_motions` has them.
     """
     if pieces > MOST_PIECES:
         return None
@@ -44,7 +45,7 @@ def free_joints(
     modes = _modes(np.where(at[:, None], arm / size[piece][:, None], turning), at)
     first = np.append(True, vector[1:] != vector[:-1])
     gram = np.zeros((6 * pieces, 6 * pieces))
-    _add_supports(gram, modes[first], driven[vector[first]], piece[first])
+    _add_supports(gram, modes[first], (driven, vector[first], frames), piece[first])
     _add_joints(gram, modes, piece, first)
     if lacking is not None:
         rows = (6 * np.arange(pieces)[:, None] + np.flatnonzero(lacking)).ravel()
@@ -68,10 +69,11 @@ def _modes(arm: NDArray, at: NDArray) -> NDArray:
     return modes
 
 
-def _add_supports(gram: NDArray, modes: NDArray, driven: NDArray, piece: NDArray) -> None:
-    """A driven component does not move."""
-    rows, component = np.nonzero(driven)
-    held = modes[rows, component]
+def _add_supports(gram: NDArray, modes: NDArray, supports: tuple, piece: NDArray) -> None:
+    """A driven component does not move. supports: driven (v, 3), the vectors (m,) of modes (m, 3, 6), frames."""
+    driven, vectors, frames = supports
+    rows, component = np.nonzero(driven[vectors])
+    held = np.einsum("mi,mij->mj", directions(frames, vectors[rows], component), modes[rows])
     blocks = np.zeros((len(gram) // 6, 6, 6))
     np.add.at(blocks, piece[rows], held[:, :, None] * held[:, None, :])
     for number, block in enumerate(blocks):

@@ -145,7 +145,9 @@ def _name(chart: ChartSpec) -> str:
 def convergence_panels(study: StudyTable, chart: ChartSpec) -> list[ChartPanel]:
     """Error over the size of elements, steps or tolerances."""
     x = chart.x or _abscissa(study)
-    panel = ChartPanel("", axis_words(study, chart, x), _error_words(study, chart))
+    panel = ChartPanel(
+        "", chart.x_label or axis_words(study, chart, x), chart.y_label or _error_words(study, chart)
+    )
     for label, rows in grouped(study, select(study, chart.only), chart).items():
         line = ChartLine(label, [error_point(row, str(chart.quantity), row.number(x)) for row in rows])
         line.more = order_words(study, chart, rows, line)

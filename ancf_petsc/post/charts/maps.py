@@ -51,9 +51,11 @@ def map_panels(study: StudyTable, chart: ChartSpec) -> list[ChartPanel]:
         words = (chart.x_label or axis_words(study, chart, x), chart.y_label or axis_words(study, chart, y))
         panel = ChartPanel(title, *words)
         found: dict[str, list[ChartPoint]] = {}
+        across, up = study.values(x), study.values(y)
         for row in rows:
-            outcome = outcome_of(row, chart)
-            place = (study.values(x).index(row.text(x)), study.values(y).index(row.text(y)))
+            if row.text(x) not in across or row.text(y) not in up:
+                continue
+            outcome, place = outcome_of(row, chart), (across.index(row.text(x)), up.index(row.text(y)))
             number = row.number(chart.quantity) if chart.quantity else float("nan")
             found.setdefault(outcome, []).append(
                 ChartPoint(*place, low=number, ended=row.ended, outcome=outcome, run=row.text("run"))

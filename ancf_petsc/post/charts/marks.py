@@ -175,7 +175,7 @@ def write_labels(figure: Figure, labels: Sequence[tuple[Axes, Sequence[EndLabel]
                 as_typed(label.text) if label.colour != GREY else label.text, (x, label.y), xycoords=transform,
                 xytext=(1.03, 0.5), textcoords="axes fraction", color=label.colour, fontsize=FONT, va="center",
                 arrowprops={"arrowstyle": "-", "color": label.colour, "linewidth": 0.6, "alpha": 0.55,
-                            "shrinkA": 1, "shrinkB": 3},
+                            "shrinkA": 1, "relpos": (0.0, 0.5), "shrinkB": 3},
                 annotation_clip=False,
             )  # fmt: skip
             pairs.append((label, text))
@@ -230,20 +230,22 @@ def plain_ticks(axes: Axes, values: Sequence[float]) -> None:
 
 def percent_ticks(axes: Axes) -> None:
     """Errors as parts of a hundred."""
-    axes.yaxis.set_major_formatter(
-        FuncFormatter(lambda value, _: f"{100 * value:.3g} %".replace("e-0", "e-"))
-    )
-    low, high = axes.get_ylim()
-    if high < 100 * low:
-        axes.yaxis.set_minor_formatter(FuncFormatter(_percent_of_leading))
-    else:
-        axes.yaxis.set_minor_formatter(NullFormatter())
+    plain_heights(axes, 100.0, " %")
 
 
-def _percent_of_leading(value: float, _: int) -> str:
-    """Of minor ticks those at 2 and 5 times a power of ten."""
-    leading = value / 10 ** np.floor(np.log10(value) + 1e-9)
-    return f"{100 * value:.2g} %" if round(leading, 3) in (2, 5) else ""
+def plain_heights(axes: Axes, factor: float = 1.0, unit: str = "") -> None:
+    """A logarithmic ordinate in plain numbers, times factor; within two decades also at 2 and 5 times powers of ten."""
+
+    def words(value: float, _: int) -> str:
+        return f"{factor * value:.3g}{unit}".replace("e-0", "e-").replace("e+0", "e")
+
+    def minor(value: float, place: int) -> str:
+        low, high = axes.get_ylim()
+        leading = value / 10 ** np.floor(np.log10(value) + 1e-9)
+        return words(value, place) if high < 100 * low and round(leading, 3) in (2, 5) else ""
+
+    axes.yaxis.set_major_formatter(FuncFormatter(words))
+    axes.yaxis.set_minor_formatter(FuncFormatter(minor))
 
 
 def finish_chart(figure: Figure, title: str, notes: Iterable[str]) -> None:

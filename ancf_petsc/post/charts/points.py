@@ -29,7 +29,7 @@ class ChartPoint:
 
     @property
     def known(self) -> bool:
-        return self.x == self.x and self.y == self.y
+        return self.x == self.x and abs(self.y) < float("inf")
 
 
 @dataclass

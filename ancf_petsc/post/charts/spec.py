@@ -11,6 +11,7 @@ from ancf_petsc.input.types import Name, Table, key, problem
 Kind = Literal["work_precision", "convergence", "map", "values", "curves", "profile"]
 Cost = Literal["seconds", "dof"]
 Scale = Literal["linear", "log"]
+Abscissa = Literal["linear", "log", "even"]
 
 NEEDED = {
     "work_precision": ("quantity",),
@@ -81,7 +82,7 @@ class ChartSpec(Table):
     labels: dict[str, str] = key('words in place of values and columns; such as { "3413" = "linear" }', {})
     x_label: Name | None = key("a text in quotes", None)
     y_label: Name | None = key("a text in quotes", None)
-    x_scale: Scale | None = key('"linear" or "log"', None)
+    x_scale: Abscissa | None = key('"linear", "log" or "even"; "even" sets values at equal distances', None)
     y_scale: Scale | None = key('"linear" or "log"', None)
     predicted: tuple[PredictedSpec, ...] = key("a list of tables; what was predicted", ())
     cost: Annotated[tuple[Cost, ...], BeforeValidator(_several)] = key(
@@ -103,6 +104,10 @@ class ChartSpec(Table):
         for name in sorted({name for names in TAKEN.values() for name in names} - {"quantity"}):
             if name in self.model_fields_set and name not in TAKEN[self.kind]:
                 raise problem(f"a chart of kind {self.kind} does not take it", at=[name], cure="drop it")
+        if self.x_scale == "even" and self.kind != "values":
+            raise problem(
+                at=["x_scale"], got="even", expected='"linear" or "log"', cure='kind = "values" takes it'
+            )
         if self.factor is not None and not self.quantity:
             raise problem("missing", at=["quantity"], expected="the quantity that factor is a limit of")
         return self

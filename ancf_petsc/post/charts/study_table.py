@@ -76,8 +76,12 @@ class StudyTable:
         return any(row.number(key) == row.number(key) for row in self.rows)
 
     def values(self, key: str) -> list[str]:
-        """The different values of a key in study.csv: numbers ascending, others as they first appear."""
-        found = list(dict.fromkeys(row.text(key) for row in self.rows if row.text(key)))
+        """The different values of a key in study.csv: numbers ascending, others as they first appear.
+
+        The empty text, a key that is taken away, is a value where the study varies it.
+        """
+        removed = any(value in ("", None) for value in self.keys.get(key, ()))
+        found = list(dict.fromkeys(row.text(key) for row in self.rows if row.text(key) or removed))
         return sorted(found, key=float) if self.is_numeric(key) and all(map(_reads, found)) else found
 
     def reference(self, quantity: str) -> Mapping[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -17,6 +18,7 @@ from ancf_petsc.post.charts.marks import (
     finish_chart,
     grid_of_panels,
     looks,
+    plain_heights,
     plain_ticks,
     write_labels,
 )
@@ -34,7 +36,7 @@ NAMED_ENDS = 14
 def value_panels(study: StudyTable, chart: ChartSpec) -> list[ChartPanel]:
     """A quantity over x; keys of words stand at the numbers of their values."""
     x, quantity, panels = str(chart.x), str(chart.quantity), []
-    places = {} if study.is_numeric(x) else {value: k for k, value in enumerate(study.values(x))}
+    places = {value: k for k, value in enumerate(study.values(x))} if is_even(study, chart) else {}
     for value, rows in panel_rows(study, chart).items():
         title = value_words(chart, str(chart.panels), value) if chart.panels else ""
         panel = ChartPanel(title, axis_words(study, chart, x), axis_words(study, chart, quantity))
@@ -51,8 +53,24 @@ def value_panels(study: StudyTable, chart: ChartSpec) -> list[ChartPanel]:
                 _relative(ChartLine(label, points)) if chart.relative else ChartLine(label, points)
             )
         panel.predicted = predicted_lines(study, chart, rows, value)
+        if places and study.is_numeric(x):
+            panel.predicted = [_between(line, [float(known) for known in places]) for line in panel.predicted]
         panels.append(panel)
     return [panel for panel in panels if panel.count > 1]
+
+
+def is_even(study: StudyTable, chart: ChartSpec) -> bool:
+    """Whether values of x stand at equal distances: words always."""
+    return chart.x_scale == "even" or not study.is_numeric(str(chart.x))
+
+
+def _between(line: ChartLine, values: list[float]) -> ChartLine:
+    """A predicted line over values that stand at equal distances."""
+    places = np.arange(len(values))
+    points = [
+        p if np.isinf(p.x) else replace(p, x=float(np.interp(p.x, values, places))) for p in line.points
+    ]
+    return ChartLine(line.label, points)
 
 
 def _relative(line: ChartLine) -> ChartLine:
@@ -88,7 +106,7 @@ def draw_values(study: StudyTable, chart: ChartSpec, panels: list[ChartPanel]) -
 
 def _scale(axes: Axes, study: StudyTable, chart: ChartSpec, panel: ChartPanel) -> None:
     axes.set(xlabel=panel.x, ylabel=panel.y)
-    if study.is_numeric(str(chart.x)):
+    if not is_even(study, chart):
         along = [p.x for line in panel.lines for p in line.points]
         axes.set_xscale(chart.x_scale or _scale_of([x for x in along if x == x]))
         plain_ticks(axes, along)
@@ -96,6 +114,8 @@ def _scale(axes: Axes, study: StudyTable, chart: ChartSpec, panel: ChartPanel) -
         names = [value_words(chart, str(chart.x), value) for value in study.values(str(chart.x))]
         axes.set_xticks(range(len(names)), names)
     axes.set_yscale(chart.y_scale or "linear")
+    if chart.y_scale == "log":
+        plain_heights(axes)
 
 
 def _scale_of(values: list[float]) -> str:

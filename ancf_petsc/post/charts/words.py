@@ -92,6 +92,8 @@ def value_words(chart: ChartSpec, key: str, value: str) -> str:
     for name in (value, short):
         if name in chart.labels:
             return as_typed(chart.labels[name])
+    if not value:
+        return "default"
     if re.fullmatch(r"\d{4}", value):  # a code of an element
         return value
     try:

@@ -36,6 +36,6 @@ class HalfMatrix:
         if self.assembly.comm.size == 1:
             symmetric_product(*self.half, x.array_r.reshape(-1, 3), into)
             return
-        local = self.assembly.local(x, self._x)
+        local = self.assembly.spread(x, self._x)
         symmetric_product(*self.half, local, into)
         add_ghost_product(*self.ghosts, local, into)

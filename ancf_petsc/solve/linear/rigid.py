@@ -10,7 +10,8 @@ from ancf_petsc.parallel.exchange import combined
 
 
 def rigid_motions(model: Model, positions: NDArray) -> NDArray[np.float64]:
-    """Orthonormal rigid motions (k, n, 3) of owned nodal vectors (n, 3): translations move positions, rotations turn slopes too.
+    """Orthonormal rigid motions (k, n, 3) of the unknowns of owned nodal vectors, whose values along the axes are positions (n, 3):
+    translations move positions, rotations turn slopes too.
 
     They vanish where supports hold: what multigrid takes from its coarse levels then leaves driven degrees of freedom alone.
     Motions out of the plane of a plane body, where a component is held everywhere, are left out. Collective.
@@ -26,6 +27,8 @@ def rigid_motions(model: Model, positions: NDArray) -> NDArray[np.float64]:
     for i, axis in enumerate(np.eye(3)):
         modes[i, own] = axis
         modes[3 + i] = np.cross(axis, arms)
+        for mode in (modes[i], modes[3 + i]):
+            model.frames.to_frames(mode)
     kept = np.concatenate((free, [free[[1, 2]].all(), free[[0, 2]].all(), free[[0, 1]].all()]))
     modes = (modes[kept] * undriven).reshape(int(kept.sum()), -1)
     for _ in range(2):

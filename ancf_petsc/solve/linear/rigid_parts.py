@@ -39,6 +39,9 @@ class RigidParts:
         field = np.repeat(labels[:, None], 3, axis=1)
         self._part = assembly.with_ghosts(field, np.empty_like(model.reference))[:, 0].astype(np.int64)
         self._free = (model.drive < 0).astype(float)
+        self._free[model.frames.vectors] = (
+            0.0  # their components are not those of the motions: they are left to the factors
+        )
         self._shifts = (slots == 0).astype(float)
         self._arms = np.empty_like(model.reference)
         self._inverse = np.zeros((6 * self.count, 6 * self.count), np.float32)

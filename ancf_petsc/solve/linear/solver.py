@@ -173,7 +173,7 @@ class LinearSolver:
     def _set_rigid_motions(self, x: PETSc.Vec) -> None:
         """Give multigrid the rigid motions of the state x."""
         vectors = []
-        for mode in rigid_motions(self.assembly.model, x.array_r.reshape(-1, 3)):
+        for mode in rigid_motions(self.assembly.model, self.assembly.along_axes(x.array_r.reshape(-1, 3))):
             vectors.append(self.assembly.vector())
             vectors[-1].array[:] = mode.ravel()
         rigid = PETSc.NullSpace().create(vectors=vectors, comm=self.assembly.comm)
