@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 import shutil
 from copy import deepcopy
 
@@ -251,3 +252,20 @@ def test_forces_too_small_for_calculix_are_noted(tmp_path):
     soft = case.with_changes({"material.young": 2e-3})
     (note,) = write(soft, make_plan(soft))[1]
     assert "takes forces below 1e-06 for none" in note
+
+
+@calculix
+def test_the_script_prints_both_and_judges(tmp_path, capsys, monkeypatch, project):
+    script = runpy.run_path(str(project / "scripts" / "cross_check"))
+    case = str(project / "cases" / "bar_tension" / "statics.toml")
+    monkeypatch.setattr(
+        "sys.argv", ["cross_check", case, "--set", "statics.steps=1", "--keep", str(tmp_path / "kept")]
+    )
+    assert script["main"]() == 0
+    said = capsys.readouterr().out
+    assert "5.025900e+02" in said
+    assert "equal: they differ by" in said
+    assert (tmp_path / "kept" / "deck.dat").is_file()
+    monkeypatch.setattr("sys.argv", ["cross_check", case, "--set", "material.law=neo_hooke"])
+    assert script["main"]() == 2
+    assert "volumetric term" in capsys.readouterr().err
