@@ -54,7 +54,7 @@ class CaseError(AncfError):
         where = [shortened(str(part), LONG) for part in (self.file, self.key) if part]
         facts = []
         if self.got is not None:
-            facts.append(f"found {shortened(_shown(self.got), SHORT)}")
+            facts.append(f"found {shortened(_shown(_plain(self.got)), SHORT)}")
         if self.expected:
             facts.append(f"expected {shortened(self.expected, LONG)}")
         middle = [part for part in (shortened(self.problem, LONG), ", ".join(facts)) if part]
@@ -64,6 +64,13 @@ class CaseError(AncfError):
     def __reduce__(self) -> tuple:
         """Errors travel between ranks by pickle, keyword arguments included."""
         return (_rebuild, (type(self), self.problem, self.file, self.key, self.got, self.expected, self.cure))
+
+
+def _plain(value: Any) -> Any:
+    """numpy's numbers and arrays, also in a list or a tuple, as Python's: numpy 2 writes np.float64(0.5)."""
+    if type(value) in (list, tuple):
+        return type(value)(map(_plain, value))
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def _rebuild(kind: type[CaseError], problem, file, key, got, expected, cure) -> CaseError:

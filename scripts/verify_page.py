@@ -9,14 +9,15 @@ from typing import Any
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 CHECKS, MUTATIONS = DOCS / "verification" / "checks.json", DOCS / "verification" / "mutations.json"
-PLATFORMS = DOCS / "verification" / "platforms.json"
+PLATFORMS, FUZZ = DOCS / "verification" / "platforms.json", DOCS / "verification" / "fuzz.json"
 KILLS, LEAKS = DOCS / "verification" / "kills.json", DOCS / "verification" / "leaks.json"
 PAGE = DOCS / "verification.md"
 HEAD = """# Verification
 
 *Made by `scripts/verify` from `docs/verification/`; do not edit.* `scripts/verify` computes every number under *found* again and
 ends with exit code 1 if an error is beyond its bound. `scripts/test_debian` and `scripts/test_current_petsc` make the table of
-platforms, `scripts/soak_kills` and `scripts/soak_leaks` those of kills and leaks, `scripts/mutate` the last one.
+platforms, `scripts/soak_kills` and `scripts/soak_leaks` those of kills and leaks, `scripts/fuzz` that of damaged inputs,
+`scripts/mutate` the last one.
 """
 
 
@@ -147,17 +148,55 @@ def mutations_part(rows: list[dict[str, Any]]) -> list[str]:
     return [*lines, ""]
 
 
+WHAT = {
+    "case": "case files: other keys, types, values, nesting, text",
+    "msh_text": "Gmsh, text: 1, 2.2, 4.1",
+    "msh_binary": "Gmsh, binary: 2.2, 4.1",
+    "inp": "Abaqus and CalculiX",
+    "bdf": "Nastran",
+    "exodus": "Exodus: netCDF 3 and HDF5",
+    "vtu": "VTU: text, plain, zlib, LZMA",
+    "vtk": "VTK: text and binary, old and new",
+    "xdmf": "XDMF: HDF5, XML, raw numbers",
+    "med": "MED",
+    "medit": "Medit: text and binary",
+    "other": "CGNS, UGRID, AVS, TetGen, H5M, ...",
+    "results": "folders of runs: plot, view, run --again, run into them",
+}
+
+
+def fuzz_part(data: dict[str, Any]) -> list[str]:
+    """Damaged inputs: what became of those of each kind."""
+    lines = [
+        "## Damaged inputs",
+        "",
+        f"`scripts/fuzz` made {data['inputs']} inputs of valid ones (seed {data['seed']}): cut off, bytes and numbers changed, "
+        "counts raised, lines and cards of other places, entities, links, bombs, devices in the place of files. "
+        f"{data['findings']} of them ended otherwise than accepted or refused in one line with exit code 2, wrote or read where "
+        "they must not, or were accepted with other cells than a second reader finds.",
+        "",
+        "| input | tried | accepted | refused | second reader: the same cells | does not read it | longest | most memory |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for kind, row in data["kinds"].items():
+        second = row["second"]
+        refused = sum(count for what, count in second.items() if what.startswith("second reader"))
+        readers = (second.get("same", 0), refused) if second.get("same") else ("", "")
+        accepted = row.get("accepted", 0) + row.get("ended early", 0)
+        most = f"{row['longest_seconds']:.1f} s", f"{row['most_memory_bytes'] / 2**20:.0f} MiB"
+        words = (WHAT[kind], row["inputs"], accepted, row.get("refused", 0), *readers, *most)
+        lines.append("| " + " | ".join(cell(str(word)) for word in words) + " |")
+    return [*lines, ""]
+
+
 def write_page() -> Path:
     """Write the page from what is there."""
     lines = [HEAD]
     if CHECKS.is_file():
         lines += checks_part(json.loads(CHECKS.read_text()))
-    if PLATFORMS.is_file():
-        lines += platforms_part(json.loads(PLATFORMS.read_text()))
-    for file, part in ((KILLS, kills_part), (LEAKS, leaks_part)):
+    several = ((PLATFORMS, platforms_part), (KILLS, kills_part), (LEAKS, leaks_part), (FUZZ, fuzz_part))
+    for file, part in (*several, (MUTATIONS, mutations_part)):
         if file.is_file():
             lines += part(json.loads(file.read_text()))
-    if MUTATIONS.is_file():
-        lines += mutations_part(json.loads(MUTATIONS.read_text()))
     PAGE.write_text("\n".join(lines).rstrip("\n") + "\n", encoding="utf-8")
     return PAGE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 import shutil
 from copy import deepcopy
 
@@ -13,12 +14,15 @@ from statics_cases import MESHES, bar, block
 from ancf_petsc import CaseError, EnvironmentProblem, NoEquilibrium, case_from_dict, run
 from ancf_petsc.cli import main
 from ancf_petsc.export.amplitudes import grouped
-from ancf_petsc.export.answers import DIGITS, compare, solve
-from ancf_petsc.export.calculix import write
+from ancf_petsc.export.answers import compare, solve
+from ancf_petsc.export.calculix import TYPES, write
 from ancf_petsc.export.names import deck_names
 from ancf_petsc.mesh.read import read_mesh
 from ancf_petsc.plan.plan import make_plan
 
+DIGITS = 5e-7
+"""Half a unit in the last of the seven digits that CalculiX prints."""
+WEDGES = TYPES["2-6-1-2", "axisymmetric"].within
 calculix = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
 
 
@@ -113,6 +117,32 @@ def test_bricks_and_plane_strain(tmp_path):
     plane["constraint"][1] = {"group": "high", "move": {"z": -0.05}}
     (tmp_path / "plane").mkdir()
     assert max(row.difference for row in compared(plane, tmp_path / "plane")) < DIGITS
+
+
+@calculix
+@pytest.mark.parametrize(("angle", "inner"), [(360.0, 1.0), (90.0, 1.0), (360.0, 0.0)])
+def test_a_ring_and_a_disc(tmp_path, angle, inner):
+    """With weight and a force on a circle; forces of CalculiX's sector times 180, whose wedges degenerate at the axis."""
+    radius, height = (a.ravel() for a in np.meshgrid(np.linspace(inner, inner + 1, 4), np.linspace(0, 2, 4)))
+    first = np.arange(15)[np.arange(15) % 4 < 3][:9]
+    quads = np.stack((first, first + 1, first + 5, first + 4), axis=1)
+    triangles = np.concatenate((quads[:, :3], quads[:, [0, 2, 3]]))
+    points = np.column_stack((radius, 0 * radius, height))
+    meshio.write(tmp_path / "ring.vtu", meshio.Mesh(points, [("triangle", triangles)]))
+    data = cube("2-6-1-2", section={"plane": "axisymmetric", "axis": "z", "angle": angle})
+    data["mesh"] |= {"file": str(tmp_path / "ring.vtu"), "rule": "reduced"}
+    data["material"] = {"law": "svk", "young": 1e6, "poisson": 0.35, "density": 1e3}
+    data["constraint"][1] = {"group": "high", "fix": ["x"], "move": {"z": -0.2}}
+    data["groups"]["circle"] = {"nearest": [inner + 1, 0.0, 1.3]}
+    rows = compared(data, tmp_path)
+    assert {row.axis for row in rows} == {"z"}
+    assert max(row.difference for row in rows) < (DIGITS if inner else WEDGES)
+    data["load"] = [
+        {"type": "gravity", "acceleration": [0.0, 0.0, -30.0]},
+        {"type": "force", "group": "circle", "total": [0.0, 0.0, 2e4], "ramp": "cosine"},
+    ]
+    (tmp_path / "loaded").mkdir()
+    assert max(row.difference for row in compared(data, tmp_path / "loaded")) < WEDGES
 
 
 def box(divisions):
@@ -222,3 +252,20 @@ def test_forces_too_small_for_calculix_are_noted(tmp_path):
     soft = case.with_changes({"material.young": 2e-3})
     (note,) = write(soft, make_plan(soft))[1]
     assert "takes forces below 1e-06 for none" in note
+
+
+@calculix
+def test_the_script_prints_both_and_judges(tmp_path, capsys, monkeypatch, project):
+    script = runpy.run_path(str(project / "scripts" / "cross_check"))
+    case = str(project / "cases" / "bar_tension" / "statics.toml")
+    monkeypatch.setattr(
+        "sys.argv", ["cross_check", case, "--set", "statics.steps=1", "--keep", str(tmp_path / "kept")]
+    )
+    assert script["main"]() == 0
+    said = capsys.readouterr().out
+    assert "5.025900e+02" in said
+    assert "equal: they differ by" in said
+    assert (tmp_path / "kept" / "deck.dat").is_file()
+    monkeypatch.setattr("sys.argv", ["cross_check", case, "--set", "material.law=neo_hooke"])
+    assert script["main"]() == 2
+    assert "volumetric term" in capsys.readouterr().err

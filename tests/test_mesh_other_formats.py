@@ -1,5 +1,7 @@
 """Reading through meshio: cells, and the names each format has."""
 
+import re
+
 import meshio
 import numpy as np
 import pytest
@@ -40,6 +42,9 @@ def body(**options) -> meshio.Mesh:
 @pytest.mark.parametrize("name", ["m.vtu", "m.vtk", "m.xdmf", "m.inp", "m.med", "m.bdf", "m.mesh", "m.ugrid"])
 def test_cells_and_points_come_through_every_format(tmp_path, name):
     body().write(tmp_path / name)
+    if name == "m.ugrid":  # with numpy 2 meshio writes np.int64(5) where it means 5
+        said = (tmp_path / name).read_text()
+        (tmp_path / name).write_text(re.sub(r"np\.\w+\((.*?)\)", r"\1", said))
     mesh = read_mesh(tmp_path / name, ("tetra",))
     assert np.allclose(mesh.points, CORNERS, atol=1e-15)
     assert mesh.cells.tolist() == TETS.tolist()

@@ -19,7 +19,8 @@ from statics_cases import block
 from ancf_petsc import case_from_dict, cli, load_case
 from ancf_petsc.analysis.run import run_case
 from ancf_petsc.cli.packages import import_problem
-from ancf_petsc.errors import EnvironmentProblem
+from ancf_petsc.errors import CaseError, EnvironmentProblem
+from ancf_petsc.input import toml
 from ancf_petsc.solve.petsc import direct_package, petsc_options
 
 READER = """
@@ -159,3 +160,22 @@ def test_the_environment_of_conda_has_every_requirement(project):
             default=Version("0"),
         )
         assert Version(given[name]) >= low, name
+
+
+class Scalar(float):
+    """A number of numpy 2, whichever numpy there is."""
+
+    def __repr__(self):
+        return f"np.float64({float(self)})"
+
+    def tolist(self):
+        return float(self)
+
+
+def test_numbers_of_numpy_stand_in_case_files_and_messages_as_numbers():
+    for number in (Scalar(0.5), np.float64(0.5)):
+        assert str(CaseError("wrong", got=number)) == "wrong: found 0.5"
+        assert str(CaseError("wrong", got=[number, 1])) == "wrong: found [0.5, 1]"
+        assert toml.value_text({"z": [number, np.int64(2)]}) == "{ z = [0.5, 2] }"
+    assert toml.value_text(np.bool_(True)) == "true"
+    assert str(CaseError("wrong", got=(np.int64(3), "a"))) == "wrong: found (3, 'a')"

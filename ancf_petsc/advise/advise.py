@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -21,7 +20,9 @@ from ancf_petsc.advise.search import FIRST, Ranking, begin, search
 from ancf_petsc.advise.steps import STEPS, fewest_steps
 from ancf_petsc.errors import CaseError
 from ancf_petsc.input.load import Case
+from ancf_petsc.reduce.findings import findings
 from ancf_petsc.studies.facts import estimate
+from ancf_petsc.studies.spec import END, OutputAt, QuantitySpec
 
 log = logging.getLogger("ancf")
 BUDGET = 600.0
@@ -62,7 +63,7 @@ def advise(
     announce(_announcement(work))
     found, timing = _motion(work) if dynamics else _statics(work)
     advice = _advice(work, found, timing, case, quantity)
-    advice.findings = findings(case)
+    advice.findings = scene_findings(case, read_quantity(quantity))
     advice.write(folder)
     return advice
 
@@ -91,21 +92,15 @@ def run_best(advice: Advice, lab_folder: Path, announce: Callable[[str], None]) 
 
 def _asked_of(base: Case, asked: Any) -> tuple[Case, Any, bool]:
     """What is asked of a working case: its path ends where the quantity is taken."""
-    from ancf_petsc.studies.spec import END, OutputAt, QuantitySpec
-
     if base.spec.statics is not None and asked.at is not None and base.spec.statics.control == "load":
         return base, QuantitySpec(column=asked.column, at=OutputAt(END)), True
     return base, asked, False
 
 
-def findings(case: Case) -> list[str]:
-    """What smaller models of the same scene there are, in sentences; none where that part is not installed."""
-    if importlib.util.find_spec("ancf_petsc.reduce") is None:
-        return []
-    from ancf_petsc import reduce
-
-    search_scene = getattr(reduce, "findings", None)
-    return [str(finding) for finding in search_scene(case)] if callable(search_scene) else []
+def scene_findings(case: Case, asked: QuantitySpec) -> list[str]:
+    """What of the model its scene does not need, in sentences with the commands for it."""
+    at = {} if asked.at is None or asked.at.column == END else {asked.at.column: asked.at.value}
+    return [str(finding) for finding in findings(case, at=at)]
 
 
 def _lines(case: Case) -> list[Discretisation]:

@@ -34,6 +34,7 @@ VERBS = {
     "modes": ("ancf_petsc.cli.modes", "natural frequencies and shapes of a case's body"),
     "mesh": ("ancf_petsc.cli.mesh", "make one of the project's meshes at a size"),
     "export": ("ancf_petsc.cli.export", "write a case as the input of another program, CalculiX"),
+    "reduce": ("ancf_petsc.cli.reduce", "write a smaller case that gives the same answer"),
     "new": ("ancf_petsc.cli.new", "write a commented case to start from"),
     "bench": ("ancf_petsc.cli.bench", "time configurations with known answers"),
 }

@@ -39,7 +39,9 @@ class Rule:
         centre = np.array(self.cell.centre(tuple(range(len(self.cell.corners)))), dtype=float)
         name = f"the rule of {len(self)} points on the {self.cell.name}"
         if not np.isclose(self.weights.sum(), volume, rtol=1e-14, atol=0):
-            raise ValueError(f"{name} has the sum of weights {self.weights.sum()!r}, expected {volume!r}")
+            raise ValueError(
+                f"{name} has the sum of weights {float(self.weights.sum())!r}, expected {volume!r}"
+            )
         if self.weights.min() <= 0:
             raise ValueError(f"{name} has a weight that is not positive")
         if not np.allclose(self.weights @ self.points, volume * centre, rtol=0, atol=1e-14):

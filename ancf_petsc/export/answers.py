@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ancf_petsc.axes import AXES
 from ancf_petsc.errors import EnvironmentProblem, NoEquilibrium
 from ancf_petsc.export import applied
-from ancf_petsc.export.calculix import EVERY_NODE, WHOLE_BODY, axes_of_deck
+from ancf_petsc.export.calculix import EVERY_NODE, WHOLE_BODY, axes_of_deck, forces_printed
 from ancf_petsc.export.names import deck_names
 from ancf_petsc.input.load import Case
 from ancf_petsc.plan.outputs import output_times
@@ -24,8 +24,6 @@ from ancf_petsc.plan.plan import Plan
 Floats = NDArray[np.float64]
 PROGRAM = "ccx"
 TOTAL = re.compile(r"total force \(fx,fy,fz\) for set (\S+) and time +(\S+)\s+(\S+) +(\S+) +(\S+)")
-DIGITS = 5e-7
-"""Half a unit in the last digit of the largest component that CalculiX prints, relative to it."""
 
 
 class ForceRow(NamedTuple):
@@ -73,7 +71,7 @@ def compare(case: Case, plan: Plan, ours: dict[str, Floats], theirs: dict[str, F
     times = output_times(case.spec, case.file)
     names, turn = deck_names(plan.mesh.groups, (EVERY_NODE, WHOLE_BODY)), axes_of_deck(plan)
     loads = applied.forces(case, plan), applied.weight(case, plan)
-    components = range(plan.element.cell.dimension)
+    components = [1] if plan.revolution else range(plan.element.cell.dimension)
     rows = []
     for k, s in enumerate(times):
         at_time = []
@@ -82,11 +80,11 @@ def compare(case: Case, plan: Plan, ours: dict[str, Floats], theirs: dict[str, F
             if len(printed) != len(times):
                 raise NoEquilibrium(f"CalculiX reached {len(printed)} of {len(times)} outputs")
             own = np.sum([applied.on_group(load, members, s) for load in loads], axis=0)[turn]
-            reaction = case.spec.output.symmetry * (printed[k, 1:] - own)
+            reaction = case.spec.output.symmetry * (printed[k, 1:] * forces_printed(plan) - own)
             for i in components:
                 axis = AXES[turn[i]]
                 at_time.append((group, axis, float(ours[f"{group}.r{axis}"][k + 1]), float(reaction[i])))
         printed_largest = max(float(np.abs(theirs[names[group]][k, 1:]).max()) for group in plan.members)
-        largest = case.spec.output.symmetry * printed_largest or 1.0
+        largest = case.spec.output.symmetry * printed_largest * forces_printed(plan) or 1.0
         rows += [ForceRow(s, *row, abs(row[2] - row[3]) / largest) for row in at_time]
     return rows

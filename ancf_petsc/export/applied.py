@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from ancf_petsc.input.load import Case
 from ancf_petsc.input.loads import ForceSpec, GravitySpec
-from ancf_petsc.mesh.groups import measure
 from ancf_petsc.model.ramp import Ramp
 from ancf_petsc.plan.plan import Plan
 from ancf_petsc.plan.ramps import Ramps
@@ -50,7 +49,7 @@ def nodal_mass(case: Case, plan: Plan) -> Floats:
     for number, material in enumerate(case.spec.material):
         cells = corners[plan.material == number]
         if len(cells) and material.density:
-            amount = material.density * thickness * measure(plan.mesh, d, cells)
+            amount = material.density * thickness * float(plan.space.sizes(d, cells).sum())
             mass += amount * plan.space.shares(d, cells)
     return mass
 

@@ -23,9 +23,11 @@ from ancf_petsc.export.refusals import refuse
 from ancf_petsc.input.load import Case
 from ancf_petsc.input.loads import GravitySpec
 from ancf_petsc.mesh.groups import cells_of
+from ancf_petsc.mesh.kinds import KINDS
 from ancf_petsc.plan.outputs import output_times
 from ancf_petsc.plan.plan import Plan
 from ancf_petsc.plan.ramps import Ramps
+from ancf_petsc.plan.revolution import on_axis
 
 REAL = "%.12e"
 """Thirteen digits in at most 20 characters, which is what CalculiX reads of a field."""
@@ -39,20 +41,37 @@ EVERY_NODE, WHOLE_BODY = "EVERY_NODE", "WHOLE_BODY"
 
 
 class Type(NamedTuple):
-    """name: CalculiX's element. points: with how many it integrates. differs: in what it is another element than ours, if it is."""
+    """name: CalculiX's element. points: with how many it integrates. differs: in what it is another element than ours, if it is.
+
+    within: part of the largest force by which both may differ: half a unit in the last of seven digits, more for other elements.
+    """
 
     name: str
     points: int
     differs: str = ""
+    within: float = 5e-7
 
 
 THICK = "CalculiX gives the nodes of plane stress elements thicknesses of their own: forces agree only as the mesh is refined"
+SECTOR = 2.0
+"""Degrees of the ring that CalculiX computes, and of which it prints forces; forces it is given are those of all of it."""
+RING = (
+    f"CalculiX computes a sector of {SECTOR:g} degrees of the ring, of bricks and wedges: forces it prints are the sector's, "
+    "and those along the radius have no counterpart here"
+)
 TYPES: dict[tuple[str, str | None], Type] = {
     ("3413", None): Type("C3D4", 1),
     ("3-10-1-3", None): Type("C3D10", 4),
     ("3813", None): Type("C3D8", 8),
+    ("2312", "strain"): Type("CPE3", 1),
+    ("2312", "stress"): Type("CPS3", 1, THICK, 1e-2),
+    ("2312", "axisymmetric"): Type("CAX3", 1, RING, 1e-2),
+    ("2-6-1-2", "strain"): Type("CPE6", 3),
+    ("2-6-1-2", "stress"): Type("CPS6", 3, THICK, 1e-2),
+    ("2-6-1-2", "axisymmetric"): Type("CAX6", 3, RING, 1e-5),
     ("2412", "strain"): Type("CPE4", 4),
-    ("2412", "stress"): Type("CPS4", 4, THICK),
+    ("2412", "stress"): Type("CPS4", 4, THICK, 1e-2),
+    ("2412", "axisymmetric"): Type("CAX4", 4, RING, 1e-3),
 }
 """CalculiX's element for ours and its plane state."""
 
@@ -66,10 +85,14 @@ def write(case: Case, plan: Plan) -> tuple[str, list[str]]:
     return file.getvalue(), deck.notes
 
 
+def type_of(case: Case) -> Type | None:
+    """CalculiX's element for that of a case; None where it has none."""
+    return TYPES.get((case.spec.mesh.element, case.spec.section.plane if case.spec.section else None))
+
+
 def same_quadrature(case: Case) -> str | None:
     """The mesh.rule with which our element has as many points as CalculiX's; None where none has, or CalculiX no such element."""
-    state = case.spec.section.plane if case.spec.section else None
-    type_ = TYPES.get((case.spec.mesh.element, state))
+    type_ = type_of(case)
     row = element(case.spec.mesh.element)
     return next(
         (name for name in row.points if name != "mass" and type_ and row.points[name] == type_.points), None
@@ -86,8 +109,9 @@ class _CalculixDeck:
         self.case, self.plan, self.file = case, plan, file
         self.spec, self.mesh = case.spec, plan.mesh
         assert case.spec.statics
-        state = case.spec.section.plane if case.spec.section else None
-        self.type = TYPES[plan.element.code, state]
+        found = type_of(case)
+        assert found
+        self.type = found
         self.names = deck_names(plan.mesh.groups, (EVERY_NODE, WHOLE_BODY))
         self.turn = axes_of_deck(plan)
         self.times = output_times(case.spec, case.file)
@@ -162,13 +186,23 @@ class _CalculixDeck:
             points = np.column_stack((points[:, :2], np.zeros(len(points))))
         self._table(np.column_stack((mesh.node_numbers[used], points)), ["%d", REAL, REAL, REAL])
         self._lines([f"*ELEMENT, TYPE={self.type.name}, ELSET={WHOLE_BODY}"])
-        self._table(np.column_stack((mesh.cell_numbers, mesh.node_numbers[mesh.cells])), "%d")
+        self._table(np.column_stack((mesh.cell_numbers, mesh.node_numbers[self._cells()])), "%d")
         for name, group in mesh.groups.items():
             nodes = group.nodes[used[group.nodes]]
             if len(nodes):
                 self._set(f"*NSET, NSET={self.names[name]}", mesh.node_numbers[nodes])
             if self.plan.element.cell.dimension in group.parts or group.cells is not None:
                 self._set(f"*ELSET, ELSET={self.names[name]}", mesh.cell_numbers[cells_of(mesh, group)])
+
+    def _cells(self) -> NDArray:
+        """Nodes (e, k) of the cells, counterclockwise in CalculiX's plane 1-2."""
+        cells, kind = self.mesh.cells, KINDS[self.mesh.kind]
+        if kind.dimension == 2 and (self.turn[1] - self.turn[0]) % 3 != 1:
+            quadratic = next(
+                (k for k in KINDS.values() if k.linear == kind.name and k.nodes == cells.shape[1]), kind
+            )
+            return cells[:, quadratic.mirrored]
+        return cells
 
     def _set(self, card: str, numbers: NDArray) -> None:
         words = [str(number) for number in numbers]
@@ -199,6 +233,9 @@ class _CalculixDeck:
             still = [axis for axis, amount in row.move.items() if amount == 0.0]
             for k in self._places((*row.fix, *still)):
                 yield from ("*BOUNDARY", f"{self.names[row.group]}, {k}, {k}")
+        if self.plan.revolution:
+            for node in self.mesh.node_numbers[on_axis(self.plan.space, self.plan.revolution)]:
+                yield from ("*BOUNDARY", f"{node}, 1, 1")
 
     def _places(self, axes: Iterable[str]) -> list[int]:
         """CalculiX's numbers of axes of the case; of plane bodies those in the plane."""
@@ -223,6 +260,7 @@ class _CalculixDeck:
 
     def _forces(self) -> Iterator[str]:
         forces, ramps = applied.forces(self.case, self.plan)
+        forces = forces * forces_given(self.plan)
         numbers = self.mesh.node_numbers[self.plan.space.nodes]
         for shares, nodes, components, amounts in grouped(forces[:, self.turn]):
             yield f"*CLOAD, AMPLITUDE={self.amplitudes.name_of_sum(ramps, shares)}"
@@ -252,8 +290,20 @@ class _CalculixDeck:
 
 
 def axes_of_deck(plan: Plan) -> list[int]:
-    """The axes of the case that are CalculiX's 1, 2 and 3."""
+    """The axes of the case that are CalculiX's 1, 2 and 3; of bodies of revolution 1 is the radius and 2 the axis."""
+    if plan.revolution:
+        return [plan.revolution.radial, plan.revolution.axis, plan.revolution.normal]
     if plan.element.cell.dimension == 3:
         return [0, 1, 2]
     first, second = (int(np.abs(plan.space.axes[:, k]).argmax()) for k in range(2))
     return [first, second, 3 - first - second]
+
+
+def forces_given(plan: Plan) -> float:
+    """What forces of the case are multiplied by for CalculiX: of bodies of revolution it takes those all around the axis."""
+    return 2.0 * np.pi / plan.revolution.angle if plan.revolution else 1.0
+
+
+def forces_printed(plan: Plan) -> float:
+    """What forces that CalculiX prints are multiplied by: of bodies of revolution they are those of its sector."""
+    return plan.revolution.angle / np.radians(SECTOR) if plan.revolution else 1.0

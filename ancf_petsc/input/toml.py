@@ -89,6 +89,10 @@ def _text(value: str) -> str:
 
 def value_text(value: Any) -> str:
     """A value as it stands in a file, on one line."""
+    if hasattr(
+        value, "tolist"
+    ):  # numpy's numbers and arrays; np.float64 is a float too, which numpy 2 writes in words
+        return value_text(value.tolist())
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -102,8 +106,6 @@ def value_text(value: Any) -> str:
         return f"{{ {inner} }}" if inner else "{}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(value_text, value))}]"
-    if hasattr(value, "tolist"):
-        return value_text(value.tolist())
     raise CaseError(
         got=value, expected="a number, text, true or false, a list or a table", cure="convert it first"
     )

@@ -90,7 +90,7 @@ def _physical_names(data: mmap.mmap, notes: list[str]) -> Names:
     """(dimension, tag) -> name, in the order of the file."""
     section = re.search(rb"\$PhysicalNames\s(.*?)\$EndPhysicalNames", data, re.DOTALL)
     lines = decoded(section[1], notes) if section else ""
-    entries = re.findall(r'(\d+)\s+(-?\d+)\s+"([^"\n]*)"', lines)
+    entries = re.findall(r'\b([0-9]{1,9})\s+(-?[0-9]{1,18})\s+"([^"\n]*)"', lines)
     return {(int(dimension), abs(int(tag))): name for dimension, tag, name in entries}
 
 
@@ -103,7 +103,11 @@ def _announced(data: mmap.mmap, header: Header) -> int | None:
         return int(np.frombuffer(data[start.end() + 8 : start.end() + 16], header.order + "u8")[0])
     words = data[start.end() : start.end() + 200].split()
     place = 1 if header.version >= 4 else 0
-    return int(words[place]) if len(words) > place and words[place].isdigit() else None
+    return (
+        int(words[place])
+        if len(words) > place and len(words[place]) < 19 and words[place].isdigit()
+        else None
+    )
 
 
 def _blocks(found: dict[str, Any], names: Names, *, old: bool) -> list[Block]:
@@ -134,7 +138,7 @@ def _with_lost_nodes(
 ) -> tuple[Integers, Floats]:
     """All nodes of an old file: Gmsh forgets those no element uses."""
     wrong = mesh_error(path)
-    start = re.search(rb"\$(?:Nodes|NOD)\s*?\n\s*(\d+)[^\n]*\n", data)
+    start = re.search(rb"\$(?:Nodes|NOD)\s*?\n\s*(\d{1,18})[^\n]*\n", data)
     if start is None:
         raise wrong("the section $Nodes does not begin with a number", cure=CURE)
     count = int(start[1])

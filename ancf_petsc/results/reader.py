@@ -214,7 +214,7 @@ class Results:
                     raise Refused(f"{path} is a link to another file")
                 one = one[name]
             check_dataset(one)
-            return one[()]
+            return np.asarray(one[()])
 
 
 def _names(steps: h5py.Group, name: str) -> tuple[str, ...]:

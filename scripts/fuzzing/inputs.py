@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import shutil
 import sys
@@ -11,6 +12,7 @@ from random import Random
 from typing import Any
 
 from fuzzing import cases, damage
+from fuzzing.datasets import HDF5, NETCDF
 from fuzzing.seeds import CASE, Seed
 
 SECRET = "424242.5 planted"
@@ -78,19 +80,14 @@ class Attempt:
     def _damage(self, main: Path, ways: tuple[damage.Damage, ...]) -> None:
         """One to three ways, one after the other; a file that a way cannot open stays as it is."""
         for _ in range(self.random.choice((0, 1, 1, 1, 1, 1, 1, 2, 3)) if self.number else 0):
+            if not os.path.isfile(main) and self.damages[-1:] != ["other_suffix"]:
+                return  # a device, a pipe, a folder: nothing more can be done to it
             way = self.random.choice(ways)
             self.damages.append(way.__name__)
-            with contextlib.suppress(
-                OSError,
-                KeyError,
-                ValueError,
-                TypeError,
-                RuntimeError,
-                AttributeError,
-                IndexError,
-                UnicodeError,
-            ):
-                way(self.room.box, main, self.random)
+            if way in HDF5 + NETCDF:
+                _apart(way, self.room.box, main, self.random)
+            else:
+                _try(way, self.room.box, main, self.random)
 
     def _make_mesh(self) -> None:
         seed, main = self._copy_seed()
@@ -143,6 +140,32 @@ class Attempt:
         }[verb]  # fmt: skip
         self.room.out.mkdir()
         self.damages = [f"{verb}, {main.suffix.strip('.')}: {', '.join(self.damages) or 'nothing'}"]
+
+
+def _try(way: damage.Damage, box: Path, main: Path, random: Random) -> None:
+    """A file that a way cannot open stays as it is."""
+    with contextlib.suppress(
+        OSError, KeyError, ValueError, TypeError, RuntimeError, AttributeError, IndexError, UnicodeError
+    ):
+        way(box, main, random)
+
+
+def _apart(way: damage.Damage, box: Path, main: Path, random: Random) -> None:
+    """The same in a process of its own: libraries crash on what was damaged before."""
+    receive, send = os.pipe()
+    child = os.fork()
+    if not child:
+        _try(way, box, main, random)
+        with os.fdopen(send, "w") as pipe:
+            json.dump(random.getstate(), pipe)
+        os._exit(0)
+    os.close(send)
+    with os.fdopen(receive) as pipe:
+        said = pipe.read()
+    os.waitpid(child, 0)
+    if said:
+        version, state, following = json.loads(said)
+        random.setstate((version, tuple(state), following))
 
 
 _pieces: dict[int, list[dict[str, Any]]] = {}

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 GIGABYTE = 2**30
+PROGRAMS = ("python", "python3", os.path.basename(sys.executable), "lscpu", "xset")
+"""This one for readers, and those by which numpy and pyvista ask for the processor and the display."""
 WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
@@ -64,11 +66,7 @@ class Watch:
             )
             if path and not path.startswith(self.allowed):
                 return f"{event} {path}"
-        elif event == "subprocess.Popen" and os.path.basename(str(given[0])) not in (
-            "python",
-            "python3",
-            os.path.basename(sys.executable),
-        ):
+        elif event == "subprocess.Popen" and os.path.basename(str(given[0])) not in PROGRAMS:
             return f"starts {given[0]}"
         elif event in (
             "os.system",

@@ -7,7 +7,18 @@ from collections.abc import Callable
 import numpy as np
 
 from ancf_petsc.mesh.abaqus import generate, place
-from ancf_petsc.mesh.abaqus.data import Line, fields, label, numbered, records, rows, table, whole, words
+from ancf_petsc.mesh.abaqus.data import (
+    Line,
+    fields,
+    label,
+    numbered,
+    plain_number,
+    records,
+    rows,
+    table,
+    whole,
+    words,
+)
 from ancf_petsc.mesh.abaqus.deck import KeywordCard
 from ancf_petsc.mesh.abaqus.scope import (
     Elements,
@@ -127,11 +138,11 @@ def _members(reader: Reader, card: KeywordCard, given: dict[str, str], what: str
     members: list[Member] = []
     for line, content in card.lines():
         own = words(content)
-        numbers = [int(word) for word in own if word.isdecimal() and word.isascii()]
+        numbers = [number for word in own if (number := plain_number(word)) is not None]
         if numbers:
             members.append(Listed(np.array(numbers, dtype=np.int64), owner))
         for word in own:
-            if not (word.isdecimal() and word.isascii()):
+            if plain_number(word) is None:
                 members += _named(reader, card, line, word, owner, what)
     return members
 
@@ -155,7 +166,7 @@ def split_name(reader: Reader, word: str):
         prefix, _, rest = word.partition(".")
         if rest and label(prefix).key == key:
             plain = rest.strip()
-            return label(rest), key, int(plain) if plain.isdecimal() and plain.isascii() else None
+            return label(rest), key, plain_number(plain)
     return label(word), "", None
 
 
@@ -163,9 +174,10 @@ def _ranges(card: KeywordCard, owner: str, what: str) -> list[Member]:
     members: list[Member] = []
     for line, text in card.lines():
         own = [word for word in fields(text) if word]
-        if not all(word.isdecimal() and word.isascii() for word in own) or len(own) not in (2, 3):
+        given = [number for word in own if (number := plain_number(word)) is not None]
+        if len(given) < len(own) or len(own) not in (2, 3):
             raise card.error("GENERATE", line=line, got=text.strip()[:40], expected="first, last, step")
-        first, last, step = (*map(int, own), 1)[:3]
+        first, last, step = (*given, 1)[:3]
         if first > last or step < 1:
             raise card.error(
                 "GENERATE", line=line, got=text.strip()[:40], expected="first <= last and a step of 1 or more"

@@ -144,6 +144,13 @@ def whole(card: KeywordCard, numbers: Floats) -> Integers:
     return numbers.astype(np.int64)
 
 
+def plain_number(word: str) -> int | None:
+    """A whole number without a sign, as large as numbers of nodes and elements may be; None for anything else."""
+    if not (word.isdecimal() and word.isascii() and len(word) <= len(str(LARGEST_NUMBER))):
+        return None
+    return int(word) if int(word) <= LARGEST_NUMBER else None
+
+
 def _is(word: str, number: float) -> bool:
     try:
         return float(word.translate(FORTRAN)) == number

@@ -16,7 +16,10 @@ from ancf_petsc.mesh.abaqus.scope import Deck, Instance, Reader
 from ancf_petsc.mesh.abaqus.sets import Resolver
 from ancf_petsc.mesh.abaqus.types import AXISYMMETRIC, SKIN
 from ancf_petsc.mesh.mesh import Integers
-from ancf_petsc.mesh.raw import Block, RawMesh
+from ancf_petsc.mesh.raw import Block, RawMesh, mesh_error
+
+MOST_RAISED = 2**62
+"""Numbers of nodes and elements, raised by instance, fit into 64 bits."""
 
 
 def _take(reader: Reader, card: KeywordCard) -> None:
@@ -41,7 +44,7 @@ def read_abaqus(path: Path) -> RawMesh:
         )
     notes += _skipped(reader)
     model = Deck(reader.assembly, _placed(reader, notes), notes)
-    return _raw(model, reader)
+    return _raw(model, reader, path)
 
 
 def _skipped(reader: Reader) -> list[str]:
@@ -90,7 +93,7 @@ class Offsets:
     by[what][key]: of nodes and elements.
     """
 
-    def __init__(self, model: Deck, resolver: Resolver) -> None:
+    def __init__(self, model: Deck, resolver: Resolver, path: Path) -> None:
         self.by: dict[str, dict[str, int]] = {"node": {}, "element": {}}
         for what, offsets in self.by.items():
             highest = {}
@@ -99,6 +102,11 @@ class Offsets:
                 if len(numbers):
                     highest[key] = int(numbers[-1])
             step = 10 ** len(str(max(highest.values(), default=0)))
+            if step * len(highest) > MOST_RAISED:
+                raise mesh_error(path)(
+                    f"{len(highest)} instances with {what} numbers up to {max(highest.values())} cannot be told apart",
+                    cure="number each part from 1",
+                )
             for place, key in enumerate(highest):
                 offsets[key] = place * step
             for key in model.instances:
@@ -113,9 +121,9 @@ class Offsets:
         return [f"instances number their nodes alike: added {', '.join(added)}"] if added else []
 
 
-def _raw(model: Deck, reader: Reader) -> RawMesh:
+def _raw(model: Deck, reader: Reader, path: Path) -> RawMesh:
     resolver = Resolver(model.instances, model.assembly)
-    offsets = Offsets(model, resolver)
+    offsets = Offsets(model, resolver, path)
     numbers: list[Integers] = [np.empty(0, dtype=np.int64)]
     points = [np.empty((0, 3))]
     for key, instance in model.instances.items():

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ancf_petsc.mesh.abaqus.data import Line, fields, label, words
+from ancf_petsc.mesh.abaqus.data import LARGEST_NUMBER, Line, fields, label, plain_number, words
 from ancf_petsc.mesh.abaqus.deck import KeywordCard
 from ancf_petsc.mesh.abaqus.place import motion
 from ancf_petsc.mesh.abaqus.scope import Elements, Listed, Nodes, Reader
@@ -26,6 +26,8 @@ def _whole_fields(card: KeywordCard, line: Line, text: str, least: int, most: in
     try:
         numbers = [int(word or 0) for word in found]
     except ValueError:
+        numbers = []
+    if any(abs(number) > LARGEST_NUMBER for number in numbers):
         numbers = []
     if not least <= len(numbers) <= most:
         raise card.error(
@@ -132,9 +134,10 @@ def copy_nodes(reader: Reader, card: KeywordCard) -> None:
 
 def _number(card: KeywordCard, given: dict[str, str], name: str) -> int:
     value = card.needed(given, name).strip()
-    if not (value.isdecimal() and value.isascii()) or int(value) < 1:
+    number = plain_number(value)
+    if number is None or number < 1:
         raise card.error(f"{name}=", got=value, expected="a whole number, 1 or more")
-    return int(value)
+    return number
 
 
 def elements(reader: Reader, card: KeywordCard) -> None:

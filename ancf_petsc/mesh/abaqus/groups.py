@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ancf_petsc.mesh.abaqus.data import Label, label
+from ancf_petsc.mesh.abaqus.data import Label, label, plain_number
 from ancf_petsc.mesh.abaqus.scope import Deck, Elements, Instance, Scope, Surface, SurfaceLine
 from ancf_petsc.mesh.abaqus.sets import Resolver
 from ancf_petsc.mesh.abaqus.types import FACES, PLANE, SKIN, SOLID
@@ -160,7 +160,7 @@ class _Groups:
             owner, word = label(prefix).key, rest
             scope = self.model.instances[owner].scope
         name: Label = label(word)
-        return owner, scope, name.key, int(word) if word.isdecimal() and word.isascii() else None
+        return owner, scope, name.key, plain_number(word)
 
     def _faces(self, surface: Surface, line: SurfaceLine, scope: Scope, instance: str) -> Iterator[Block]:
         for key, numbers in self._chosen(surface, line, scope, instance, "element").items():

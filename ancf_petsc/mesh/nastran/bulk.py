@@ -21,10 +21,13 @@ from ancf_petsc.mesh.mesh import Floats, Integers
 from ancf_petsc.mesh.text import DeckFiles, as_text
 
 DEEPEST = 32
+MOST_LISTED = 10_000_000
+"""Numbers that THRU may stand for in a card."""
 LARGEST = 1e100
 """Larger coordinates have no volumes that are finite."""
 EXPONENT = re.compile(r"(?<=[\d.])([+-]\d)")
-NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:E[+-]?\d+)?")
+NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:E[+-]?\d+)?", re.ASCII)
+WHOLE = re.compile(r"[+-]?[0-9]{1,15}")
 INCLUDE = re.compile(r"\s*INCLUDE\s*['\"]?\s*([^'\"]*)", re.IGNORECASE)
 
 
@@ -213,7 +216,7 @@ def integers(cards: list[Card], field: int, default: str = "0") -> Integers:
     """The whole number in a field of every card (n,)."""
     words = [card.field(field) or default for card in cards]
     for card, word in zip(cards, words, strict=True):
-        if not word.lstrip("+-").isdecimal() or not word.isascii() or len(word) > 15:
+        if not WHOLE.fullmatch(word):
             raise card.error(f"field {field + 1} is not a whole number", got=word, cure="mend the card")
     return np.array([int(word) for word in words], dtype=np.int64)
 
@@ -222,15 +225,22 @@ def listed(card: Card, start: int) -> Integers:
     """Numbers from a field on, with THRU and BY (k,)."""
     words = [word.upper() for word in card.fields[start:] if word]
     found: list[Integers] = []
-    at = 0
+    at = made = 0
     while at < len(words):
         first = _whole(card, words[at])
         if at + 2 < len(words) and words[at + 1] == "THRU":
             last, step, used = _whole(card, words[at + 2]), 1, 3
             if at + 4 < len(words) and words[at + 3] == "BY":
                 step, used = _whole(card, words[at + 4]), 5
-            if last < first or step < 1 or last - first > 10**8:
+            if last < first or step < 1:
                 raise card.error("THRU", got=" ".join(words[at : at + used]), expected="first THRU last")
+            made += (last - first) // step + 1
+            if made > MOST_LISTED:
+                raise card.error(
+                    "THRU",
+                    got=" ".join(words[at : at + used]),
+                    expected=f"at most {MOST_LISTED} numbers in a card",
+                )
             found.append(np.arange(first, last + 1, step))
             at += used
         else:

@@ -67,7 +67,8 @@ MECHANICS = re.compile(
     r"BCONP|BCTABLE|BCTSET|BCTADD|BGSET|TIE|CONTACT|SPOINT|EPOINT"
 )
 NAMED = re.compile(
-    r'HMNAME\s+(?:PROP|COMP)\S*\s+(\d+)\s*"([^"]+)"|\s*Femap Property (\d+) : (.+)', re.IGNORECASE
+    r'HMNAME\s+(?:PROP|COMP)\S*\s+([0-9]{1,15})\s*"([^"]+)"|\s*Femap Property ([0-9]{1,15}) : (.+)',
+    re.IGNORECASE,
 )
 
 

@@ -38,7 +38,7 @@ class Contradiction(Exception):
         self.wanted, self.why = wanted, why
 
 
-class Frame(NamedTuple):
+class NodeFrame(NamedTuple):
     """axes (3, 3): perpendicular unit vectors as columns. drives: of each component, None where it is free."""
 
     axes: Floats
@@ -50,7 +50,7 @@ class Frame(NamedTuple):
         return np.array_equal(self.axes, np.eye(3))
 
 
-def frame_of(wanted: Sequence[Wanted]) -> Frame:
+def frame_of(wanted: Sequence[Wanted]) -> NodeFrame:
     """The frame of a node from all that is prescribed there, axes before other directions. Raises Contradiction."""
     axes, parts = np.zeros((3, 3)), list[list[Drive] | None]([None, None, None])
     largest = max((abs(item.drive.amplitude) for item in wanted), default=0.0)
@@ -72,7 +72,7 @@ def frame_of(wanted: Sequence[Wanted]) -> Frame:
         if len(parts[place] or ()) > 1:
             raise Contradiction(item, "two ramps would move these nodes across each other")
     drives = tuple(None if part is None else (part or [HELD])[0] for part in parts)
-    return Frame(_completed(axes, [part is not None for part in parts]), drives)
+    return NodeFrame(_completed(axes, [part is not None for part in parts]), drives)
 
 
 def _summed(drives: Sequence[Drive], largest: float) -> list[Drive]:

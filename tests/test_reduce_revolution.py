@@ -1,0 +1,215 @@
+"""Bodies of revolution and prisms are recognised as wholes and as sectors, in any place and direction; so is what is none."""
+
+from __future__ import annotations
+
+import meshio
+import numpy as np
+import pytest
+from scene_bodies import CENTRE, INNER, OUTER, box_case, box_mesh, ring_case, ring_mesh
+
+from ancf_petsc import CaseError, case_from_dict, load_case, run
+from ancf_petsc.mesh.gmsh_session import gmsh_session
+from ancf_petsc.mesh.kinds import KINDS, part_sizes, qualities
+from ancf_petsc.plan.plan import make_plan
+from ancf_petsc.reduce.prism import prism_of
+from ancf_petsc.reduce.profile import profile_of
+from ancf_petsc.reduce.profile_lines import simplified, traced
+from ancf_petsc.reduce.profile_mesh import meshed
+from ancf_petsc.reduce.revolution import Ring, ring_of
+from ancf_petsc.reduce.symmetry import SceneModel
+from ancf_petsc.reduce.write import reduce, write_case
+
+
+def scene_of(case):
+    return SceneModel(case, make_plan(case))
+
+
+def area_of(mesh):
+    return float(np.abs(part_sizes(mesh.points, mesh.cells, KINDS["triangle"])).sum())
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_whole_ring_and_its_section(tmp_path, axis):
+    """The axis to chords, the profile to rounding: nodes lie on the body, and chords around it are chords of angle."""
+    scene = scene_of(ring_case(tmp_path, axis=axis))
+    ring, why = ring_of(scene)
+    assert why == ""
+    assert ring.is_whole
+    assert ring.axis.tolist() == np.eye(3)[axis].tolist()
+    expected = np.roll([*CENTRE, 6.0], axis - 2)
+    np.testing.assert_allclose(ring.point, expected, atol=0.02)
+    profile = simplified(profile_of(scene, ring))
+    assert len(profile.points) == 4
+    low, high = profile.points.min(axis=0), profile.points.max(axis=0)
+    np.testing.assert_allclose([low, high], [[INNER, 1.0], [OUTER, 11.0]], atol=0.02)
+    mesh = meshed(profile, 0, 2, 2.0)
+    assert area_of(mesh) == pytest.approx((OUTER - INNER) * 10.0, rel=5e-3)
+    assert qualities(mesh.points, mesh.cells, KINDS["triangle"]).min() > 0.4
+    for name, level in (("low", 1.0), ("high", 11.0)):
+        group = mesh.groups[name]
+        assert np.ptp(mesh.points[group.nodes, 2]) < 1e-12
+        assert mesh.points[group.nodes[0], 2] == pytest.approx(level)
+        assert len(group.parts[1]) == len(group.nodes) - 1
+
+
+def test_the_quarter_of_the_block_is_a_sector_of_a_ring(project):
+    scene = scene_of(load_case(project / "cases" / "pvc_block"))
+    ring, _ = ring_of(scene)
+    assert ring.angle == pytest.approx(np.pi / 2)
+    assert set(ring.walls) == {"constraint.symmetry_x", "constraint.symmetry_y"}
+    np.testing.assert_allclose(ring.point[:2], 0, atol=1e-15)
+    corners = {tuple(np.round(p, 9)) for p in simplified(profile_of(scene, ring)).points.tolist()}
+    groove = {
+        (0.025, 0.0),
+        (0.095, 0.0),
+        (0.095, 0.04),
+        (0.07, 0.05),
+        (0.095, 0.06),
+        (0.095, 0.1),
+        (0.025, 0.1),
+    }
+    assert corners == groove
+
+
+def test_a_half_between_its_plane_of_symmetry(tmp_path):
+    half, _ = write_case(reduce(ring_case(tmp_path, size=2.2), "half-x"), tmp_path / "half")
+    ring, why = ring_of(scene_of(half))
+    assert why == ""
+    assert ring.angle == np.pi
+    assert ring.walls == ("constraint.symmetry_x",)
+
+
+def test_a_disc_and_a_hollow_sphere_have_sections_that_end_on_the_axis(tmp_path):
+    """A disc without a hole; a sphere of radius 5 with a hole of radius 2 inside it, held on its outer surface."""
+    scene = scene_of(ring_case(tmp_path, hollow=0.0))
+    ring, _ = ring_of(scene)
+    mesh = meshed(simplified(profile_of(scene, ring)), 0, 2, 2.5)
+    assert area_of(mesh) == pytest.approx(OUTER * 10.0, rel=5e-3)
+    assert mesh.points[:, 0].min() == pytest.approx(0.0, abs=1e-12)
+    path = tmp_path / "sphere.msh"
+    with gmsh_session(
+        **{"Mesh.MeshSizeMax": 1.6, "Mesh.MeshSizeMin": 1.6, "Mesh.MshFileVersion": 2.2}
+    ) as gmsh:
+        occ = gmsh.model.occ
+        occ.cut([(3, occ.addSphere(1, 2, 3, 5))], [(3, occ.addSphere(1, 2, 3, 2))])
+        occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [1], 1, "body")
+        gmsh.model.addPhysicalGroup(2, [gmsh.model.getEntities(2)[0][1]], 2, "skin")
+        gmsh.model.mesh.generate(3)
+        gmsh.write(str(path))
+    case = case_from_dict(
+        {
+            "title": "Sphere",
+            "mesh": {"file": str(path), "element": "3413"},
+            "material": {"law": "svk", "young": 1.0, "poisson": 0.3, "density": 1.0},
+            "constraint": [{"group": "skin", "fix": ["x", "y", "z"]}],
+            "load": [{"type": "gravity", "acceleration": [0.0, -1.0, 0.0]}],
+            "statics": {"steps": 1},
+        },
+        tmp_path,
+    )
+    scene = scene_of(case)
+    ring, why = ring_of(scene)
+    assert why == ""
+    assert ring.axis.tolist() == [0.0, 1.0, 0.0]
+    profile = simplified(profile_of(scene, ring))
+    assert len(traced(profile)) == 1
+    mesh = meshed(profile, 0, 1, None)
+    assert area_of(mesh) == pytest.approx(np.pi / 2 * (5**2 - 2**2), rel=0.05)
+    assert "skin" in mesh.groups
+
+
+def test_the_section_has_the_force_of_the_ring_and_of_its_half(tmp_path):
+    """Within what two coarse meshes of quadratic elements differ by; sectors keep their angle, so that symmetry stays."""
+    whole = ring_case(tmp_path, "3-10-1-3", axis=1, size=2.2)
+    half, _ = write_case(reduce(whole, "half-z"), tmp_path / "half")
+    expected = run(whole, tmp_path / "whole").curve["force"][-1]
+    for number, case in enumerate((whole, half)):
+        folder = tmp_path / f"section {number}"
+        section, plan = write_case(reduce(case, "section", 1.5), folder)
+        assert section.spec.mesh.element == "2-6-1-2"
+        assert section.spec.section.axis == "y"
+        assert section.spec.section.angle == (180.0 if number else None)
+        assert section.spec.output.symmetry == (2 if number else 1)
+        assert len(plan.mesh.cells) < 100
+        assert run(section, tmp_path / f"run {number}").curve["force"][-1] == pytest.approx(
+            expected, rel=0.02
+        )
+
+
+def test_rotating_mirrors_what_leaves_a_sector():
+    ring = Ring(
+        np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]), np.pi / 2, ("a", "b")
+    )
+    radius, angle, height = ring.coordinates(ring.rotated(np.array([[1.0, 2.0, 5.0], [3.0, 0.0, 5.0]]), 0.5))
+    np.testing.assert_allclose(radius, 2.0)
+    np.testing.assert_allclose(angle, np.pi / 4)
+    np.testing.assert_allclose(height, 5.0)
+
+
+SIDEWAYS = [{"type": "force", "group": "high", "total": [1.0, 0.0, 0.0]}]
+WRONG = {
+    "a force across": ({"load": SIDEWAYS}, r"load\.0: what it does to high is not along"),
+    "weight across": (
+        {"load": [{"type": "gravity", "acceleration": [0.0, 1.0, 0.0]}], "material.density": 1.0},
+        r"load\.0: \(0, 1, 0\) is not along the axis",
+    ),
+    "one component": ({"constraint.low.fix": ["x", "z"]}, r"constraint\.low: components held on low differ around"),
+    "a patch": (
+        {"groups": {"patch": {"box": [[-10, -10, 0], [3, 20, 2]]}}, "constraint.low.group": "patch"},
+        r"constraint\.patch: patch at .* rotated by .* lies off by",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "message"), WRONG.values(), ids=WRONG.keys())
+def test_what_differs_around_the_axis_is_refused_with_its_reason(tmp_path, changes, message):
+    case = ring_case(tmp_path).with_changes({"output.curve": None, **changes})
+    with pytest.raises(CaseError, match=f"not one of revolution about the axis through .*{message}") as error:
+        reduce(case, "section")
+    assert "\n" not in str(error.value)
+
+
+def test_a_notch_or_a_square_is_no_ring(tmp_path):
+    ring_mesh(tmp_path / "ring.msh", notch=1.5)
+    case = ring_case(tmp_path, notch=1.5)
+    assert ring_of(scene_of(case))[0] is None
+    assert ring_of(scene_of(box_case(tmp_path)))[0] is None
+
+
+# --- prisms
+
+
+def test_a_prism_between_planes_of_symmetry(tmp_path):
+    """Held along y at both ends; with one end free, or a load along y, it is none."""
+    ends = {
+        "front": {"plane": "y", "at": "min"},
+        "back": {"plane": "y", "at": "max"},
+        "low": {"plane": "z", "at": "min"},
+        "high": {"plane": "z", "at": "max"},
+    }
+    rows = [
+        {"group": "front", "fix": ["y"]},
+        {"group": "back", "fix": ["y"]},
+        {"group": "low", "fix": ["x", "z"]},
+        {"group": "high", "fix": ["x"], "move": {"z": -0.3}},
+    ]
+    case = box_case(tmp_path, groups=ends, constraint=rows)
+    assert prism_of(scene_of(case)) == (1, 1.0)
+    assert prism_of(scene_of(box_case(tmp_path, groups=ends, constraint=rows[1:]))) is None
+    weight = [{"type": "gravity", "acceleration": [0.0, 1.0, 0.0]}]
+    assert prism_of(scene_of(box_case(tmp_path, groups=ends, constraint=rows, load=weight))) is None
+    patch = {**ends, "high": {"box": [[0, 0, 3], [2, 0.5, 3]]}}
+    assert prism_of(scene_of(box_case(tmp_path, groups=patch, constraint=rows))) is None
+    points = meshio.read(box_mesh(tmp_path / "plain.vtu"))
+    tapered = points.points * np.column_stack(
+        (1 + 0.1 * points.points[:, 1], *np.ones((2, len(points.points))))
+    )
+    meshio.write(tmp_path / "box.vtu", meshio.Mesh(tapered, [("tetra", tetrahedra_of(points.cells[0].data))]))
+    assert prism_of(scene_of(box_case(tmp_path, "3413", groups=ends, constraint=rows))) is None
+
+
+def tetrahedra_of(bricks):
+    from ancf_petsc.mesh.kinds import KUHN
+
+    return bricks[:, np.array(KUHN)].reshape(-1, 4)
