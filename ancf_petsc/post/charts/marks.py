@@ -36,7 +36,7 @@ TICK_GAP = 0.17
 """Least distance of ticks of a short logarithmic axis, in parts of it."""
 COLUMN, ROW = 4.6, 3.9
 """Inches of a panel."""
-NOTE_LETTERS, TITLE_LETTERS = 18.0, 11.5
+NOTE_LETTERS, TITLE_LETTERS = 16.5, 10.0
 """In an inch."""
 
 
