@@ -171,7 +171,9 @@ def load_steps() -> list[str]:
                 loads = [row for row in some if row.text("statics.steps") == steps]
                 cells.append(longest(loads, key, unit, factor))
             rows.append([words, said, *cells])
-    return table(["body", "line search", "one output, steps up to 0.4", "four outputs, steps up to 0.25"], rows)
+    return table(
+        ["body", "line search", "one output, steps up to 0.4", "four outputs, steps up to 0.25"], rows
+    )
 
 
 def longest(rows: Sequence[StudyRow], key: str, unit: str, factor: float) -> str:

@@ -97,6 +97,19 @@ def test_labels_stand_right_of_the_axes_and_apart(ladder):
     assert not any(axes.get_legend() for axes in figure.axes)
 
 
+def test_long_titles_and_notes_stay_within_the_picture(tmp_path):
+    study = read_study(
+        study_folders.ladder(tmp_path / "long", title="Element, mesh and rim of the block " * 4)
+    )
+    spec = chart(kind="work_precision", quantity="force", cost="dof", note="Edges of 20 to 6 mm and " * 9)
+    figure = errors.draw_precision(study, spec, errors.precision_panels(study, spec))
+    figure.draw_without_rendering()
+    assert "\n" in figure.get_suptitle()
+    assert "\n" in figure.get_supxlabel()
+    for text in figure.texts:
+        assert text.get_window_extent().x1 < figure.bbox.width
+
+
 def test_words_at_one_height_are_moved_apart_as_little_as_needed():
     found = apart([0.5, 0.5, 0.9, 0.51], [0.1] * 4)
     assert found[2] == pytest.approx(0.9)
