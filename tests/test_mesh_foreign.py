@@ -71,6 +71,7 @@ def test_a_reader_that_does_not_come_to_an_end_is_stopped(tmp_path, monkeypatch)
     path = tmp_path / "m.vtu"
     body().write(path)
     monkeypatch.setattr(process, "PATIENCE", 0.0)
+    monkeypatch.setattr(process, "WAITING", 0.0)
     refused(path, "meshio does not come to an end of it in 0 s; write it again")
 
 

@@ -125,7 +125,8 @@ def _read(pipe: int, seconds: float, count: int | None = None) -> bytes | None:
     pieces: list[bytes] = []
     left = count
     while left is None or left:
-        if not select.select([pipe], [], [], max(0.0, end - time.monotonic()))[0]:
+        waiting = end - time.monotonic()
+        if waiting <= 0.0 or not select.select([pipe], [], [], waiting)[0]:
             return None
         piece = os.read(pipe, 2**20 if left is None else left)
         if not piece:
