@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 import shutil
 from copy import deepcopy
 
@@ -16,6 +17,7 @@ from ancf_petsc.export.amplitudes import grouped
 from ancf_petsc.export.answers import compare, solve
 from ancf_petsc.export.calculix import TYPES, write
 from ancf_petsc.export.names import deck_names
+from ancf_petsc.export.planes import solved_for
 from ancf_petsc.mesh.read import read_mesh
 from ancf_petsc.plan.plan import make_plan
 
@@ -116,6 +118,52 @@ def test_bricks_and_plane_strain(tmp_path):
     plane["constraint"][1] = {"group": "high", "move": {"z": -0.05}}
     (tmp_path / "plane").mkdir()
     assert max(row.difference for row in compared(plane, tmp_path / "plane")) < DIGITS
+
+
+@calculix
+@pytest.mark.parametrize("angle", [0.5, np.pi / 2])
+def test_planes_held_along_their_normals(tmp_path, angle):
+    """A block rotated about z: a side along x is *BOUNDARY, oblique ones are equations, also where two meet and where x moves."""
+    points, cells = box((2, 1, 2))
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    meshio.write(tmp_path / "block.vtu", meshio.Mesh(points @ turn, [("hexahedron", cells)]))
+    data = cube("3813", load=[{"type": "gravity", "acceleration": [0.4, 0.3, -1.0]}])
+    data["mesh"]["file"] = str(tmp_path / "block.vtu")
+    data["material"] = {"law": "svk", "young": 1e4, "poisson": 0.3, "density": 20.0}
+    data["groups"] |= {f"side{k}": {"plane": turn[k].tolist(), "at": "min"} for k in range(2)}
+    held = [{"group": f"side{k}", "fix": ["normal"]} for k in range(2)]
+    moved = {"group": "high", "fix": ["z"], "move": {"x": 0.04}}
+    data["constraint"] = [
+        {"group": "low", "fix": ["normal"]},
+        {**moved, "move": {"z": -0.1}, "fix": []},
+        *held,
+    ]
+    rows = compared(data, tmp_path)
+    assert {row.group for row in rows} == {"low", "high", "side0", "side1"}
+    assert max(row.difference for row in rows) < DIGITS
+    assert ("*EQUATION" in (tmp_path / "deck.inp").read_text()) == (angle == 0.5)
+    data["constraint"] = [{"group": "low", "fix": ["normal"]}, moved, held[0]]
+    if angle == 0.5:
+        (tmp_path / "moved").mkdir()
+        assert max(row.difference for row in compared(data, tmp_path / "moved")) < DIGITS
+
+
+def test_equations_each_give_a_component_of_their_own():
+    slanted, free = np.array([[0.6, 0.8, 0.0], [0.0, 0.6, 0.8]]), np.ones(3, bool)
+    for rows, allowed in ((slanted, free), (slanted, np.array([False, True, True])), (slanted[:1], free)):
+        found = solved_for(rows, allowed)
+        given = [terms[0][0] for terms in found]
+        assert len(set(given)) == len(found) == len(rows)
+        assert all(allowed[i] for i in given)
+        assert all(i not in given for terms in found for i, _ in terms[1:])
+        back = np.zeros((len(found), 3))
+        for row, terms in zip(back, found, strict=True):
+            for i, factor in terms:
+                row[i] = factor
+        assert np.linalg.matrix_rank(np.concatenate((back, rows))) == len(rows)
+    assert solved_for(slanted[:1], np.array([False, False, True])) == []
+    assert solved_for(np.repeat(slanted[:1], 2, axis=0), free) == solved_for(slanted[:1], free)
 
 
 @calculix
@@ -251,3 +299,20 @@ def test_forces_too_small_for_calculix_are_noted(tmp_path):
     soft = case.with_changes({"material.young": 2e-3})
     (note,) = write(soft, make_plan(soft))[1]
     assert "takes forces below 1e-06 for none" in note
+
+
+@calculix
+def test_the_script_prints_both_and_judges(tmp_path, capsys, monkeypatch, project):
+    script = runpy.run_path(str(project / "scripts" / "cross_check"))
+    case = str(project / "cases" / "bar_tension" / "statics.toml")
+    monkeypatch.setattr(
+        "sys.argv", ["cross_check", case, "--set", "statics.steps=1", "--keep", str(tmp_path / "kept")]
+    )
+    assert script["main"]() == 0
+    said = capsys.readouterr().out
+    assert "5.025900e+02" in said
+    assert "equal: they differ by" in said
+    assert (tmp_path / "kept" / "deck.dat").is_file()
+    monkeypatch.setattr("sys.argv", ["cross_check", case, "--set", "material.law=neo_hooke"])
+    assert script["main"]() == 2
+    assert "volumetric term" in capsys.readouterr().err

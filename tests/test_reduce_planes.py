@@ -245,6 +245,48 @@ def test_moments_of_a_box(tmp_path):
     np.testing.assert_allclose(second, np.diag([4.0, 1.0, 9.0]) * 6.0 / 12, atol=1e-12)
 
 
+# --- planes held along their normals
+
+
+def pressed_between_slides(folder, angle, **more):
+    """A cube on end, rotated about z by an angle: its sides slide in their planes, so that it is compressed uniformly."""
+    points, cells = mirrored_tetrahedra()
+    c, s = np.cos(angle), np.sin(angle)
+    normals = {"a": [c, s, 0.0], "b": [-s, c, 0.0]}
+    turned = (points * [0.5, 1.0, 1.0]) @ np.array([normals["a"], normals["b"], [0.0, 0.0, 1.0]])
+    meshio.write(folder / "box.vtu", meshio.Mesh(turned, [("tetra", cells)]))
+    ends = {"low": {"plane": "z", "at": "min"}, "high": {"plane": "z", "at": "max"}}
+    sides = {
+        f"{name}_{at}": {"plane": normal, "at": at}
+        for name, normal in normals.items()
+        for at in ("min", "max")
+    }
+    held = [{"group": name, "fix": ["normal"]} for name in sides]
+    rows = [{"group": "low", "fix": ["normal"]}, {"group": "high", "move": {"z": -0.3}}, *held]
+    return box_case(
+        folder, "3413", **{"groups": ends | sides, "constraint": rows, "statics": {"steps": 1}, **more}
+    )
+
+
+def test_a_rotated_cube_held_along_its_normals_is_symmetric(tmp_path):
+    """About its diagonals, which are normal to axes after 45 degrees; about its middle planes; uniform strain on any mesh."""
+    case = pressed_between_slides(tmp_path, np.pi / 4)
+    scene = SceneModel(case, make_plan(case))
+    assert sum(plane.axis in (0, 1) for plane in mirror_planes(scene)) == 2
+    assert len(mirror_planes(scene)) == 4
+    quarter, _ = smaller(case, "quarter", tmp_path / "quarter")
+    assert quarter.spec.output.symmetry == 4
+    expected = force(case, tmp_path / "whole")
+    assert abs(expected[-1]) > 10
+    np.testing.assert_allclose(force(quarter, tmp_path / "run"), expected, rtol=1e-8)
+    open_side = [{"group": name, "fix": ["normal"]} for name in ("low", "a_max", "b_min", "b_max")]
+    rows = [*open_side, {"group": "high", "move": {"z": -0.3}}]
+    with pytest.raises(CaseError, match="constraint.b_min: b_min at .* has no mirror image"):
+        reduce(pressed_between_slides(tmp_path, np.pi / 4, constraint=rows), "half-x")
+    with pytest.raises(CaseError, match="not symmetric about x"):
+        reduce(pressed_between_slides(tmp_path, 0.4), "half-x")
+
+
 # --- refusals
 
 MOTION = {"duration": 1.0, "step": 0.1}

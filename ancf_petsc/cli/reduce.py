@@ -8,7 +8,7 @@ from pathlib import Path
 from ancf_petsc.cli.run import add_case_arguments, changes
 from ancf_petsc.launcher import quick_if_alone
 
-HELP = "write a smaller case that gives the same answer: half, quarter, section"
+HELP = "write a smaller case that gives the same answer: half, quarter, section, wedge"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,8 +17,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
     parser.add_argument("--to", required=True, choices=KINDS_OF_PARTS, help="what of the body is kept")
     parser.add_argument(
-        "--size", type=float, metavar="H", help="length of edges of a section (default that of the body's)"
+        "--size",
+        type=float,
+        metavar="H",
+        help="length of edges of a section or wedge (default that of the body's)",
     )
+    parser.add_argument("--angle", type=float, metavar="DEGREES", help="of a wedge, up to 90 (default 10)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="the folder to write (default NAME-TO)")
 
 
@@ -32,7 +36,7 @@ def execute(arguments: argparse.Namespace) -> int:
 
     def write() -> None:
         case = load_case(arguments.case, changes(arguments))
-        smaller = reduce(case, arguments.to, arguments.size)
+        smaller = reduce(case, arguments.to, arguments.size, arguments.angle)
         folder = arguments.out or Path(f"{case.name}-{arguments.to}")
         _, plan = write_case(smaller, folder)
         for note in smaller.notes:

@@ -19,6 +19,7 @@ from ancf_petsc.element.catalog import element
 from ancf_petsc.export import applied
 from ancf_petsc.export.amplitudes import Amplitudes, grouped
 from ancf_petsc.export.names import deck_names
+from ancf_petsc.export.planes import axes_held, equations, plane_normals
 from ancf_petsc.export.refusals import refuse
 from ancf_petsc.input.load import Case
 from ancf_petsc.input.loads import GravitySpec
@@ -114,6 +115,7 @@ class _CalculixDeck:
         self.type = found
         self.names = deck_names(plan.mesh.groups, (EVERY_NODE, WHOLE_BODY))
         self.turn = axes_of_deck(plan)
+        self.normals = plane_normals(plan, case.spec)
         self.times = output_times(case.spec, case.file)
         self.ramps = Ramps(case.spec, case.file)
         self.amplitudes = Amplitudes(self.times)
@@ -231,11 +233,15 @@ class _CalculixDeck:
     def _supports(self) -> Iterator[str]:
         for row in self.spec.constraint:
             still = [axis for axis, amount in row.move.items() if amount == 0.0]
-            for k in self._places((*row.fix, *still)):
+            for k in self._places((*axes_held(row, self.normals), *still)):
                 yield from ("*BOUNDARY", f"{self.names[row.group]}, {k}, {k}")
         if self.plan.revolution:
             for node in self.mesh.node_numbers[on_axis(self.plan.space, self.plan.revolution)]:
                 yield from ("*BOUNDARY", f"{node}, 1, 1")
+        for point, terms in equations(self.plan, self.spec, self.normals):
+            node = self.mesh.node_numbers[point]
+            yield from ("*EQUATION", str(len(terms)))
+            yield ", ".join(f"{node}, {self.turn.index(axis) + 1}, {REAL % factor}" for axis, factor in terms)
 
     def _places(self, axes: Iterable[str]) -> list[int]:
         """CalculiX's numbers of axes of the case; of plane bodies those in the plane."""

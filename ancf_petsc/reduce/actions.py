@@ -13,10 +13,12 @@ from ancf_petsc.mesh.groups import cells_of, parts_for_support
 from ancf_petsc.mesh.mesh import Mesh
 from ancf_petsc.mesh.parts import outer_sides
 from ancf_petsc.plan.plan import Plan
-from ancf_petsc.reduce.shape import BoundarySurface, Floats, Simplices, triangles
+from ancf_petsc.plan.supports.frames import PARALLEL
+from ancf_petsc.plan.supports.normal import plane_of
+from ancf_petsc.reduce.shape import CLOSE, BoundarySurface, Floats, Simplices, triangles
 
 SAME = 1e-9
-"""Directions and amounts that differ by less than this times their largest are the same."""
+"""Directions and amounts that differ by less than this times their largest are the same; planes of nodes up to CLOSE."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class SceneAction:
         scale = max(float(np.abs(amount).max()), float(np.abs(other.amount).max()))
         return (
             (self.kind, self.ramp) == (other.kind, other.ramp)
-            and bool(np.abs(held - other.held).max() <= SAME)
+            and bool(np.abs(held - other.held).max() <= CLOSE)
             and bool(np.abs(amount - other.amount).max() <= SAME * scale)
         )
 
@@ -52,18 +54,34 @@ def actions_on_shapes(case: Case, plan: Plan, surface: BoundarySurface) -> list[
 
 def _supports(case: Case, plan: Plan, surface: BoundarySurface) -> list[SceneAction]:
     """One for each group and ramp, and each dimension of what the group is meshed with."""
-    by_group: dict[tuple[str, object], tuple[Floats, Floats]] = {}
+    by_group: dict[tuple[str, object], list[tuple[Floats, float]]] = {}
     for row in case.spec.constraint:
         ramp = row.ramp if any(row.move.values()) else None
-        held, amount = by_group.setdefault((row.group, ramp), (np.zeros((3, 3)), np.zeros(3)))
-        for axis in (*row.fix, *row.move):
-            i = AXES.index(axis)
-            held[i, i], amount[i] = 1.0, row.move.get(axis, 0.0)
+        own = by_group.setdefault((row.group, ramp), [])
+        own += [(np.eye(3)[AXES.index(axis)], amount) for axis, amount in row.move.items()]
+        own += [(_direction(plan, row.group, word), 0.0) for word in row.fix]
     return [
         SceneAction(f"constraint.{name}", "support", shape, held, amount, ramp, (name,))
-        for (name, ramp), (held, amount) in by_group.items()
+        for (name, ramp), directions_held in by_group.items()
+        for held, amount in [_held(directions_held)]
         for shape in _shapes_of_support(plan.mesh, surface, name)
     ]
+
+
+def _direction(plan: Plan, name: str, word: str) -> Floats:
+    """The unit vector (3,) that a word of `fix` holds a group along."""
+    if word in AXES:
+        return np.eye(3)[AXES.index(word)]
+    return plane_of(plan.supports.part, plan.mesh.groups[name], f"constraint.{name}.fix")
+
+
+def _held(directions_held: list[tuple[Floats, float]]) -> tuple[Floats, Floats]:
+    """Projector (3, 3) onto what is held, and the displacement (3,) in it, from directions and displacements along them."""
+    if not directions_held:
+        return np.zeros((3, 3)), np.zeros(3)
+    rows = np.array([direction for direction, _ in directions_held])
+    inverse = np.linalg.pinv(rows, rcond=PARALLEL)
+    return inverse @ rows, inverse @ np.array([amount for _, amount in directions_held])
 
 
 def _shapes_of_support(mesh: Mesh, surface: BoundarySurface, name: str) -> list[Simplices]:

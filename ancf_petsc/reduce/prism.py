@@ -46,7 +46,7 @@ def _same_along(scene: SceneModel, axis: int, low: float, high: float) -> bool:
     for action in acting:
         across = np.delete(action.held[axis], axis)
         scale = np.abs(action.amount).max()
-        if np.abs(across).max() > SAME or (scale and abs(action.amount[axis]) > SAME * scale):
+        if np.abs(across).max() > CLOSE or (scale and abs(action.amount[axis]) > SAME * scale):
             return False
     facets = scene.surface.facets
     heights = scene.mesh.points[facets][..., axis]

@@ -21,24 +21,53 @@ LINEAR = "2312"
 ELEMENTS = {"3413": LINEAR}
 OTHERWISE = "2-6-1-2"
 """The element of the section for that of the body."""
+MEANS = {"section": "of radius and height", "wedge": "whose components across the axis are its own"}
 
 
 def reduced_to_section(scene: SceneModel, size: float | None) -> SmallerCase:
     """The axisymmetric case. size: length of edges, that of the body's by default. Raises CaseError where there is no axis."""
+    ring = ring_or_refuse(scene, "section")
+    profile = simplified(profile_of(scene, ring))
+    radial, axial = axes_of_section(ring)
+    smaller = replace(tables_and_mesh(scene.case, scene.mesh), mesh=meshed(profile, radial, axial, size))
+    _fill_tables(smaller, scene, ring, radial, axial)
+    require_groups(smaller, scene)
+    return smaller
+
+
+def ring_or_refuse(scene: SceneModel, to: str) -> Ring:
+    """The ring that a scene is a sector of. Raises CaseError, with the reason, where it is none."""
     ring, why = ring_of(scene)
     if ring is None:
         raise CaseError(
             f"the scene is not one of revolution {why}",
             file=scene.case.file,
             key="--to",
-            got="section",
+            got=to,
             cure="ancf advise lists what it is",
         )
-    profile = simplified(profile_of(scene, ring))
-    radial, axial = axes_of_section(ring)
-    smaller = replace(tables_and_mesh(scene.case, scene.mesh), mesh=meshed(profile, radial, axial, size))
-    _fill_tables(smaller, scene, ring, radial, axial)
-    return smaller
+    return ring
+
+
+def require_groups(smaller: SmallerCase, scene: SceneModel) -> None:
+    """Raise CaseError where something acts on a group that the new mesh lacks: points on the axis, of which it need have none."""
+    for name, rows in (
+        ("constraint", smaller.data.get("constraint", [])),
+        ("load", smaller.data.get("load", [])),
+    ):
+        for number, row in enumerate(rows):
+            group = row.get("group")
+            if group is not None and (
+                group not in smaller.mesh.groups or not len(smaller.mesh.groups[group].nodes)
+            ):
+                raise CaseError(
+                    "it acts on points, and the part is meshed anew",
+                    file=scene.case.file,
+                    key=f"{name}.{group if name == 'constraint' else number}",
+                    got=group,
+                    expected="faces, or edges around the axis",
+                    cure="give it to a face, or take --to quarter",
+                )
 
 
 def axes_of_section(ring: Ring) -> tuple[int, int]:
@@ -67,7 +96,7 @@ def _fill_tables(smaller: SmallerCase, scene: SceneModel, ring: Ring, radial: in
         velocity = [0.0, 0.0, 0.0]
         velocity[axial] = float(np.array(spec.initial.velocity) @ ring.axis)
         data["initial"] = {"velocity": velocity}
-    _outputs(smaller, ring, axial)
+    follow_axis(smaller, ring, axial, "section")
     for key in ("load", "constraint"):
         if not data[key]:
             del data[key]
@@ -94,8 +123,8 @@ def _supports(scene: SceneModel, ring: Ring, radial: int, axial: int) -> list[di
     return rows
 
 
-def _outputs(smaller: SmallerCase, ring: Ring, axial: int) -> None:
-    """The curve where it follows the axis, probes of groups that the section has."""
+def follow_axis(smaller: SmallerCase, ring: Ring, axial: int, part: str) -> None:
+    """The curve where it follows the axis, probes of groups that the part, a section or a wedge, has."""
     data, groups = smaller.data, smaller.mesh.groups
     curve = data.get("output", {}).get("curve")
     if curve:
@@ -103,7 +132,7 @@ def _outputs(smaller: SmallerCase, ring: Ring, axial: int) -> None:
             group, _, axis = direction.rpartition(".")
             if group not in groups or abs(ring.axis[AXES.index(axis)]) < 1.0 - CLOSE:
                 smaller.notes.append(
-                    f"output.curve.{key}: {direction} is no direction along the axis of a group of the section: left out"
+                    f"output.curve.{key}: {direction} is no direction along the axis of a group of the {part}: left out"
                 )
                 data["output"].pop("curve", None)
             else:
@@ -111,12 +140,10 @@ def _outputs(smaller: SmallerCase, ring: Ring, axial: int) -> None:
     probes = data.pop("probe", [])
     kept = [row for row in probes if row["group"] in groups]
     smaller.notes.extend(
-        f"probe {row['name']}: {row['group']} is none of the section's groups: left out"
+        f"probe {row['name']}: {row['group']} is none of the {part}'s groups: left out"
         for row in probes
         if row not in kept
     )
-    smaller.notes.extend(
-        f"probe {row['name']}: the mean over the section, of radius and height" for row in kept
-    )
+    smaller.notes.extend(f"probe {row['name']}: the mean over the {part}, {MEANS[part]}" for row in kept)
     if kept:
         data["probe"] = kept

@@ -12,15 +12,16 @@ from ancf_petsc.reduce.mesh_file import write_mesh
 from ancf_petsc.reduce.section import reduced_to_section
 from ancf_petsc.reduce.symmetry import SceneModel
 from ancf_petsc.reduce.tables import SmallerCase
+from ancf_petsc.reduce.wedge import reduced_to_wedge
 
 MESH_FILE = "mesh.msh"
-SECTION = "section"
-KINDS_OF_PARTS = (*HALVES, QUARTER, SECTION)
+SECTION, WEDGE = "section", "wedge"
+KINDS_OF_PARTS = (*HALVES, QUARTER, SECTION, WEDGE)
 """What a case can be reduced to."""
 
 
-def reduce(case: Case, to: str, size: float | None = None) -> SmallerCase:
-    """The smaller case of a kind. size: length of edges of a section, by default those of the body.
+def reduce(case: Case, to: str, size: float | None = None, angle: float | None = None) -> SmallerCase:
+    """The smaller case of a kind. size: length of edges of a section or wedge, by default those of the body. angle: of a wedge, degrees.
 
     Raises CaseError where the scene does not allow it, with the reason.
     """
@@ -33,7 +34,13 @@ def reduce(case: Case, to: str, size: float | None = None) -> SmallerCase:
             got=plan.element.code,
             expected="a solid element",
         )
+    if angle is not None and to != WEDGE:
+        raise CaseError(
+            "only a wedge has an angle", key="--angle", got=angle, expected="--to wedge", cure="leave it out"
+        )
     scene = SceneModel(case, plan)
+    if to == WEDGE:
+        return reduced_to_wedge(scene, size, angle)
     return reduced_to_section(scene, size) if to == SECTION else reduced_by_planes(scene, to)
 
 

@@ -26,8 +26,8 @@ def enter(spec: ConstraintSpec, part: Part, table: SupportTable) -> None:
     key = f"constraint.{spec.group}.fix"
     group = part.group(spec.group, f"constraint.{spec.group}.group")
     normal = plane_of(part, group, key)
-    along = int(np.argmax(np.abs(normal)))
-    if np.abs(np.delete(normal, along)).max() < ALIGNED:
+    along = axis_of(normal)
+    if along is not None:
         table.prescribe(group, {along: HELD})
         return
     if part.revolution is not None:
@@ -49,6 +49,12 @@ def enter(spec: ConstraintSpec, part: Part, table: SupportTable) -> None:
             cure="turn the mesh, or take an element such as 3-10-1-3",
         )
     table.prescribe_normal(group, normal)
+
+
+def axis_of(normal: NDArray[np.float64]) -> int | None:
+    """The axis that a unit vector (3,) lies along, None for none."""
+    along = int(np.argmax(np.abs(normal)))
+    return along if np.abs(np.delete(normal, along)).max() < ALIGNED else None
 
 
 def plane_of(part: Part, group: Group, key: str) -> NDArray[np.float64]:
