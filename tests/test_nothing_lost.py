@@ -29,13 +29,13 @@ MOTION = with_checkpoints(
 
 @pytest.mark.parametrize(("case", "seed"), [(STATIC, 1), (MOTION, 2)], ids=["statics", "motion"])
 def test_a_run_killed_at_random_moments_loses_nothing(case, seed, tmp_path):
-    """Four kills each, every other one with a power cut, in a process that is a copy of this one."""
+    """Five kills each, every other one with a power cut, in a process that is a copy of this one."""
     run(case, tmp_path / "whole")
     dice, kills = random.Random(seed), 0
     begun = time.monotonic()
     killed_alone(case, tmp_path / "timed", 60.0)
     lasts = time.monotonic() - begun
-    while kills < 4:
+    while kills < 5:
         if not killed_alone(case, tmp_path / "run", dice.uniform(0.2, 0.7) * lasts):
             break
         kills += 1
