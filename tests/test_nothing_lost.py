@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import shutil
 import time
 from runpy import run_path
 
@@ -37,7 +38,11 @@ def test_a_run_killed_at_random_moments_loses_nothing(case, seed, tmp_path):
     lasts = time.monotonic() - begun
     while kills < 5:
         if not killed_alone(case, tmp_path / "run", dice.uniform(0.2, 0.7) * lasts):
-            break
+            if kills:
+                break
+            shutil.rmtree(tmp_path / "run")  # on a machine that was busier before it was over too soon
+            lasts /= 2
+            continue
         kills += 1
         if kills % 2 == 0:
             cut_power(tmp_path / "run", dice)
