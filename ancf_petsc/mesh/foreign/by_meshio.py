@@ -15,7 +15,6 @@ import numpy as np
 
 from ancf_petsc.mesh.foreign.guard import Refused, one_line
 
-
 BASE64 = re.compile(rb"[A-Za-z0-9+/=\s]*")
 
 
