@@ -165,6 +165,16 @@ def test_numbers_of_xdmf_may_lie_below_it(tmp_path):
     refused(path, "its data file 'data/m.h5' is missing")
 
 
+def test_packed_numbers_are_base64_throughout(tmp_path):
+    """Python's reader passes over other letters: all coordinates behind them would be others."""
+    path = tmp_path / "m.vtu"
+    body().write(path, compression=None)
+    text = path.read_text()
+    packed = text.index("AAAA", text.index("<Points"))
+    path.write_text(f"{text[: packed + 2]}-1{text[packed + 2 :]}")
+    refused(path, "its packed numbers are no base64")
+
+
 # --- HDF5
 
 

@@ -15,7 +15,6 @@ from pydantic.fields import FieldInfo
 from ancf_petsc.axes import AXES
 from ancf_petsc.errors import CaseError, did_you_mean
 from ancf_petsc.input.loads import LOADS
-from ancf_petsc.input.schema import CaseSpec
 from ancf_petsc.input.toml import BARE
 
 LONGEST = 80

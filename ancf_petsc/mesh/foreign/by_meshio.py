@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import io
+import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +14,8 @@ import meshio
 import numpy as np
 
 from ancf_petsc.mesh.foreign.guard import Refused, one_line
+
+BASE64 = re.compile(rb"[A-Za-z0-9+/=\s]*")
 
 
 def contents(path: Path, words: list[str]) -> dict[str, Any]:
@@ -26,7 +31,7 @@ def contents(path: Path, words: list[str]) -> dict[str, Any]:
         return {"known": False}
     said = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        with _strict_base64(), contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             mesh = meshio.read(path)
     except SystemExit:
         raise Refused(" ".join(said.getvalue().split()) or "no reason given") from None
@@ -47,6 +52,24 @@ def contents(path: Path, words: list[str]) -> dict[str, Any]:
         "point_tags": _families(mesh, "point_tags"),
         "said": " ".join(said.getvalue().split()),
     }  # fmt: skip
+
+
+@contextlib.contextmanager
+def _strict_base64() -> Iterator[None]:
+    """Python passes over letters that are none of base64, and all numbers behind them are others: here they are an error."""
+    lenient = base64.b64decode
+
+    def decode(text: Any, *rest: Any, **more: Any) -> bytes:
+        letters = text.encode() if isinstance(text, str) else bytes(text)
+        if not BASE64.fullmatch(letters):
+            raise ValueError("its packed numbers are no base64")
+        return lenient(letters, *rest, **more)
+
+    base64.b64decode = decode
+    try:
+        yield
+    finally:
+        base64.b64decode = lenient
 
 
 def _numbers(given: Any, what: str) -> np.ndarray:
