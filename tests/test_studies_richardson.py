@@ -112,3 +112,19 @@ def test_growing_strains_make_the_limit_uncertain_or_forbid_it():
 def test_an_order_above_the_elements_is_an_accident():
     h = np.array([1.0, 0.5, 0.25])
     assert "accident" in extrapolate(Ladder(h, 1 + h**4, 2.0)).words
+
+
+def test_an_integrator_shows_its_own_order():
+    """Steps too long for the method's order: bdf of order 2 on the pendulum, steps of 10, 5 and 2.5 ms, shows 2.43."""
+    sizes, values = [0.01, 0.005, 0.0025], [-0.23533397, -0.23434537, -0.23416196]
+    assert extrapolate(Ladder(sizes, values)).verdict == ASYMPTOTIC
+    found = extrapolate(Ladder(sizes, values, exact=2))
+    assert found.verdict == NOT_ASYMPTOTIC
+    assert "2.4 is not the integrator's, 2" in found.words
+    steps, path = (
+        [0.002, 0.001, 0.0005, 0.00025],
+        [3.917e-4, 1.322e-4, 5.23e-5, 1.55e-5],
+    )  # finest three 1.76, all 1.5
+    assert extrapolate(Ladder(steps, [1.0 + e for e in path], exact=2)).verdict == NOT_ASYMPTOTIC
+    exact = [1.0 + h**2 for h in sizes]
+    assert extrapolate(Ladder(sizes, exact, exact=2)).limit == pytest.approx(1.0, rel=1e-9)

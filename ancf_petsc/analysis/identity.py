@@ -49,8 +49,9 @@ class Identity:
         return _digest(f"{self.case} {self.mesh}".encode())[:SHORT]
 
     def of_program(self, version: str | None = None) -> str:
-        """Of both and the program: the name of a run whose numbers may be used again. version: default that of this program, and its
-        source as it is now.
+        """Of both and the program: the name of a run whose numbers may be used again.
+
+        version: default that of this program, with its source as it is now.
         """
         program = version or f"{program_version()} {source_digest()}"
         return _digest(f"{self.case} {self.mesh} {program}".encode())[:SHORT]

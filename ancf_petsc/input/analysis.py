@@ -121,6 +121,11 @@ class DynamicsSpec(OwnKeys):  # type: ignore[misc, valid-type]
         """The value of the integrator's own key, 0 where it has none."""
         return getattr(self, self.method.option.name) if self.method.option else 0
 
+    @property
+    def method_order(self) -> int | None:
+        """The order of the integrator's error in the step; None where it is not known."""
+        return self.method.order(self.option)
+
     @model_validator(mode="after")
     def _check(self) -> DynamicsSpec:
         name = self.integrator

@@ -13,7 +13,8 @@ from ancf_petsc.studies.spec import QuantitySpec
 
 MESHES = ("mesh.size", "mesh.refine", "mesh.divisions", "mesh.rim", "mesh.file")
 """Keys that make meshes finer: the size of a level is that of its elements."""
-NUMBERS = ("dynamics.step", "dynamics.tolerance", "statics.tolerance")
+STEP = "dynamics.step"
+NUMBERS = (STEP, "dynamics.tolerance", "statics.tolerance")
 COUNTS = ("statics.steps",)
 LADDERS = (*MESHES, *NUMBERS, *COUNTS)
 MESH = "mesh"
@@ -89,13 +90,20 @@ def _extrapolated(
 ) -> LadderLimit:
     values = [row.found[quantity] for row in rows]
     formal = stretches = None
+    exact = _method_order(rows) if key == STEP else None
     if key in (*MESHES, MESH):
         orders = {row.run.facts.order for row in rows if row.run.facts}
         formal = 2.0 * max(orders) if orders else None
         if len(rows) >= 3:
             seen = [row.stretch_at(asked) for row in rows]
             stretches = None if None in seen else [stretch for stretch in seen if stretch is not None]
-    return extrapolate(Ladder(sizes, values, formal, stretches))
+    return extrapolate(Ladder(sizes, values, formal, stretches, exact=exact))
+
+
+def _method_order(rows: Sequence[RunRow]) -> int | None:
+    """The order of the integrator that all rows have."""
+    orders = {row.run.case.spec.dynamics.method_order for row in rows if row.run.case.spec.dynamics}
+    return orders.pop() if len(orders) == 1 else None
 
 
 def _longest(key: str, keys: Sequence[str], rows: Sequence[RunRow]) -> int:

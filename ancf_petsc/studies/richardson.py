@@ -33,6 +33,8 @@ CONFIRMED, UNCONFIRMED = 1.25, 2.0
 """Factors of safety Fs."""
 BEYOND = 1.0
 """An order may be larger by this than the element's, or than growing strains allow, before it is called an accident."""
+NEAR = 0.25
+"""How far from its own order that of an integrator may seem."""
 FOLDED = 0.66
 """A stretch below which free surfaces fold: Biot's of svk is 0.640 to 0.658, a crease of neo_hooke forms at 0.65."""
 DEEPER = 0.02
@@ -59,6 +61,7 @@ class Ladder:
     """Levels, coarse to fine.
 
     sizes, values (l,). formal: the highest order that a smooth problem would show, None where it is not known.
+    exact: the order that there must be, as of an integrator, None where it is not known.
     stretches (l,): the smallest stretch in the body at each level, None where there is none to be read.
     """
 
@@ -66,6 +69,7 @@ class Ladder:
     values: Sequence[float]
     formal: float | None = None
     stretches: Sequence[float] | None = None
+    exact: float | None = None
 
 
 def extrapolate(ladder: Ladder) -> LadderLimit:
@@ -85,7 +89,15 @@ def extrapolate(ladder: Ladder) -> LadderLimit:
     problem = _problem(triples, ladder, h, stretch)
     if problem:
         return _refused(problem)
-    return _limit(h, q, triples, stretch)
+    found = _limit(h, q, triples, stretch)
+    exact = ladder.exact
+    seen = [found.order, *(triple[0] for triple in triples[-1:] if triple)]
+    odd = [order for order in seen if exact and order and abs(order - exact) > NEAR]
+    if odd:
+        return _refused(
+            f"the order {odd[0]:.2g} is not the integrator's, {exact:g}: steps are too long to show it"
+        )
+    return found
 
 
 def _refused(words: str) -> LadderLimit:
