@@ -54,7 +54,7 @@ class CaseError(AncfError):
         where = [shortened(str(part), LONG) for part in (self.file, self.key) if part]
         facts = []
         if self.got is not None:
-            facts.append(f"found {shortened(_shown(_plain(self.got)), SHORT)}")
+            facts.append(f"found {shortened(_shown(self.got), SHORT)}")
         if self.expected:
             facts.append(f"expected {shortened(self.expected, LONG)}")
         middle = [part for part in (shortened(self.problem, LONG), ", ".join(facts)) if part]
@@ -119,7 +119,7 @@ def shortened(text: str, most: int) -> str:
 def _shown(value: object) -> str:
     """repr, also of a whole number with more digits than Python writes and of what is nested too deep."""
     try:
-        return repr(value)
+        return repr(_plain(value))
     except (ValueError, RecursionError) as error:
         return f"{type(value).__name__} ({error})"
 

@@ -171,18 +171,20 @@ def load_steps() -> list[str]:
                 loads = [row for row in some if row.text("statics.steps") == steps]
                 cells.append(longest(loads, key, unit, factor))
             rows.append([words, said, *cells])
-    return table(["body", "line search", "one step, by the tangent", "four, extrapolated"], rows)
+    return table(
+        ["body", "line search", "one output, steps up to 0.4", "four outputs, steps up to 0.25"], rows
+    )
 
 
 def longest(rows: Sequence[StudyRow], key: str, unit: str, factor: float) -> str:
-    """The largest load up to which every run reached its end in no more steps than it was asked for."""
+    """The largest load up to which every run reached its end without a step being cut."""
 
     def load(row: StudyRow) -> float:
         return max(abs(float(part)) for part in written(row.text(key)).strip("[]").split(","))
 
     best = 0.0
     for row in sorted(rows, key=load):
-        if not row.ended or row.number("taken") > row.number("statics.steps"):
+        if row.outcome != "reached":
             break
         best = load(row)
     return f"{factor * best:g} {unit}" if best else "none of these"

@@ -125,3 +125,25 @@ def test_of_one_file_it_is_what_sha256sum_prints(tmp_path):
 def test_a_mesh_that_is_not_there_is_an_error(tmp_path):
     with pytest.raises(MeshError, match=r"none\.msh: cannot be read: No such file"):
         mesh_hash(tmp_path / "none.msh")
+
+
+def test_a_program_of_other_source_is_another_program(tmp_path, monkeypatch):
+    """Between two releases the version stays and numbers may change."""
+    from ancf_petsc.analysis import identity as module
+
+    for name, text in {"solve/newton.py": "a = 1\n", "cli/run.py": "b = 1\n"}.items():
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr(module, "PACKAGE", tmp_path)
+
+    def digest():
+        module.source_digest.cache_clear()
+        return module.source_digest()
+
+    first = digest()
+    (tmp_path / "cli/run.py").write_text("b = 2\n")
+    assert digest() == first
+    (tmp_path / "solve/newton.py").write_text("a = 2\n")
+    assert digest() != first
+    monkeypatch.undo()
+    module.source_digest.cache_clear()

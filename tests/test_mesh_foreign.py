@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import signal
+import subprocess
+import sys
 
 import h5py
 import meshio
@@ -68,7 +71,13 @@ def test_a_reader_that_does_not_come_to_an_end_is_stopped(tmp_path, monkeypatch)
     path = tmp_path / "m.vtu"
     body().write(path)
     monkeypatch.setattr(process, "PATIENCE", 0.0)
+    monkeypatch.setattr(process, "WAITING", 0.0)
     refused(path, "meshio does not come to an end of it in 0 s; write it again")
+
+
+def test_the_limit_of_time_holds():
+    code = "from ancf_petsc.mesh.foreign import limits; limits.limit(2**30, 0.0)\nwhile True: pass"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == -signal.SIGXCPU
 
 
 def test_a_reader_that_asks_for_all_memory_is_refused_it(tmp_path):
@@ -86,9 +95,6 @@ def test_memory_grows_with_the_file_and_what_is_packed(tmp_path):
 
 def test_the_limit_of_memory_holds():
     """In a process of its own, which cannot raise it again by itself."""
-    import subprocess
-    import sys
-
     code = (
         "from ancf_petsc.mesh.foreign import limits; limits.limit(2**28, 5.0); a = bytearray(2**27); "
         "print('taken'); b = bytearray(2**28)"

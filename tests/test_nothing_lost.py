@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import shutil
 import time
 from runpy import run_path
 
@@ -29,15 +30,19 @@ MOTION = with_checkpoints(
 
 @pytest.mark.parametrize(("case", "seed"), [(STATIC, 1), (MOTION, 2)], ids=["statics", "motion"])
 def test_a_run_killed_at_random_moments_loses_nothing(case, seed, tmp_path):
-    """Four kills each, every other one with a power cut, in a process that is a copy of this one."""
+    """Five kills each, every other one with a power cut, in a process that is a copy of this one."""
     run(case, tmp_path / "whole")
     dice, kills = random.Random(seed), 0
     begun = time.monotonic()
     killed_alone(case, tmp_path / "timed", 60.0)
     lasts = time.monotonic() - begun
-    while kills < 4:
+    while kills < 5:
         if not killed_alone(case, tmp_path / "run", dice.uniform(0.2, 0.7) * lasts):
-            break
+            if kills:
+                break
+            shutil.rmtree(tmp_path / "run")  # on a machine that was busier before it was over too soon
+            lasts /= 2
+            continue
         kills += 1
         if kills % 2 == 0:
             cut_power(tmp_path / "run", dice)

@@ -70,7 +70,9 @@ def test_precision_has_a_line_an_element_and_leaves_failed_runs_to_the_margin(la
 
 def test_the_front_is_what_no_run_beats(ladder):
     panel = errors.precision_panels(ladder, chart(kind="work_precision", quantity="force"))[0]
-    points = [p for line in panel.lines for p in line.shown]
+    shown = [p for line in panel.lines for p in line.shown]
+    points = [p for p in shown if p.alone]
+    assert [p.best for p in shown if not p.alone] == [False]
     for p in points:
         beaten = any(o.x <= p.x and o.y <= p.y and (o.x, o.y) != (p.x, p.y) for o in points)
         assert p.best != beaten
@@ -93,6 +95,19 @@ def test_labels_stand_right_of_the_axes_and_apart(ladder):
         assert all(axes.transAxes.transform(text.get_position())[0] > edge for text in axes.texts)
     assert {"3413", "3-10-1-3", "3443"} == set(texts(figure))
     assert not any(axes.get_legend() for axes in figure.axes)
+
+
+def test_long_titles_and_notes_stay_within_the_picture(tmp_path):
+    study = read_study(
+        study_folders.ladder(tmp_path / "long", title="Element, mesh and rim of the block " * 4)
+    )
+    spec = chart(kind="work_precision", quantity="force", cost="dof", note="Edges of 20 to 6 mm and " * 9)
+    figure = errors.draw_precision(study, spec, errors.precision_panels(study, spec))
+    figure.draw_without_rendering()
+    assert "\n" in figure.get_suptitle()
+    assert "\n" in figure.get_supxlabel()
+    for text in figure.texts:
+        assert text.get_window_extent().x1 < figure.bbox.width
 
 
 def test_words_at_one_height_are_moved_apart_as_little_as_needed():

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import signal
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -371,6 +372,32 @@ def test_on_other_ranks_to_rounding(kept, ancf, tmp_path):
         shutil.copytree(kept[2][start], tmp_path / str(ranks))
         ancf("run", "case.toml", "--restart", "--out", str(ranks), "--quiet", ranks=ranks)
         assert largest_difference(kept[0] / "whole", tmp_path / str(ranks)) < 1e-9
+
+
+def test_a_batch_job_is_requeued_after_an_interruption(project, tmp_path):
+    """With an srun that ends like an interrupted run: requeued, checked only the first time, in one folder for all parts."""
+    for name, body in (("srun", 'case "$*" in *" run "*) exit 130;; esac'), ("scontrol", ":")):
+        (tmp_path / name).write_text(f'#!/bin/sh\necho "{name} $*" >> "$SAID"\n{body}\n')
+        (tmp_path / name).chmod(0o755)
+    said = tmp_path / "said"
+    fixed = {"PATH": f"{tmp_path}:{os.environ['PATH']}", "SAID": str(said), "SLURM_JOB_ID": "7"}
+    words = [
+        "bash",
+        str(project / "scripts" / "cluster.slurm"),
+        "cases/pvc_block",
+        "--set",
+        "a=1",
+        "--",
+        "-ksp_view",
+    ]
+    for count in ("0", "1"):
+        environment = os.environ | fixed | {"SLURM_RESTART_COUNT": count}
+        assert subprocess.run(words, cwd=tmp_path, env=environment, check=False).returncode == 130
+    run_line = "run cases/pvc_block --out results/7 --restart --set a=1 -- -ksp_view"
+    lines = said.read_text().splitlines()
+    assert [line.endswith(run_line) for line in lines] == [False, True, False, True, False]
+    assert lines[0].endswith("check cases/pvc_block")
+    assert lines[2] == lines[4] == "scontrol requeue 7"
 
 
 def test_on_two_ranks_to_the_last_bit_and_a_full_disk(mpirun, project, tmp_path):

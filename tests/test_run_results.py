@@ -13,6 +13,7 @@ import meshio
 import numpy as np
 import pytest
 import pyvista
+from conftest import PATIENCE
 
 from ancf_petsc import open_results
 
@@ -32,7 +33,7 @@ def folder(request, environment, project, tmp_path_factory):
         str(out),
     ]
     command += [str(project / "cases/pvc_block"), "--set", "statics.steps=4", "--quiet"]
-    subprocess.run(command, env=environment, check=True, capture_output=True, timeout=120)
+    subprocess.run(command, env=environment, check=True, capture_output=True, timeout=120 * PATIENCE)
     return out
 
 

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from restart_cases import differences, followed, snapshots, with_checkpoints
 from slender_bodies import arch, solved
 
-from ancf_petsc import case_from_dict
+from ancf_petsc import case_from_dict, open_results
 from ancf_petsc.errors import CaseError
 
 LOAD = 0.02
@@ -77,6 +78,23 @@ def test_one_two_and_three_ranks_come_to_rest_alike(jumped, on_three_ranks, tmp_
         assert one["steps"] == found[0]["steps"] > 10
         assert one["energy"] == pytest.approx(curve["strain_energy"][row], rel=1e-7)
         assert one["at"][1] == pytest.approx(curve["stroke"][row], rel=1e-8)
+
+
+def test_a_path_that_was_carried_on_goes_on_from_its_checkpoints(tmp_path):
+    """From the last one before the jump, and from one after it, to the last bit."""
+    case = with_checkpoints(
+        arch(tmp_path, load=LOAD, times=[0.3, 0.6, 1.0], after_limit="dynamics"), "4 steps"
+    )
+    with snapshots(tmp_path) as kept:
+        end = followed(case, tmp_path / "whole")
+    jumped = [open_results(folder).curve["jumps"].any() for folder in kept]
+    assert {False, True} == set(jumped)
+    for folder in (kept[jumped.index(True) - 1], kept[jumped.index(True)]):
+        assert followed(case, folder, restart=True) == end
+        assert differences(tmp_path / "whole", folder) == [], folder.name
+        summaries = [open_results(path).summary for path in (tmp_path / "whole", folder)]
+        assert summaries[0]["jumps"] == summaries[1]["jumps"]
+        assert len(summaries[0]["jumps"]) == 1
 
 
 def test_arc_length_needs_no_dynamics(tmp_path):

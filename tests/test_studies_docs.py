@@ -15,7 +15,7 @@ PAGE = (Path(__file__).parents[1] / "docs" / "study.md").read_text(encoding="utf
 
 
 def test_the_example_is_a_study():
-    (text,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+    text, *_ = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
     spec = check_study(tomllib.loads(text), Path("study.toml"))
     assert spec.combinations
     assert spec.reference["force"].kind == "richardson"

@@ -102,6 +102,37 @@ def test_interrupted_killed_and_broken_runs_are_done_again(finished, tmp_path):
     assert lasting(copy) == lasting(finished.folder)
 
 
+@pytest.mark.parametrize(
+    ("status", "kind", "code", "outcome"),
+    [
+        ("done", "reached", 0, "reached"),
+        ("done", "reached", None, "reached"),  # its study was killed meanwhile
+        ("stopped", "surface_fold", 3, "surface_fold"),
+        ("stopped", "surface_fold", None, "surface_fold"),
+        ("stopped", "environment", None, None),
+        ("interrupted", "interrupted", 130, None),
+        (None, None, None, None),
+        (None, None, 2, "wrong_input"),
+        (None, None, 4, "crashed"),
+        (None, None, -9, "crashed"),
+    ],
+)
+def test_how_runs_ended(status, kind, code, outcome, tmp_path):
+    from ancf_petsc.studies.ending import read_end
+
+    if status:
+        end = {"kind": kind, "message": "why"}
+        said = {"status": status, "hash": "abc", "end": end, "versions": {"ancf_petsc": "1"}}
+        (tmp_path / "summary.json").write_text(json.dumps(said))
+    found = read_end(tmp_path, "abc", "1", {"code": code, "reason": "because"})
+    assert (found and found.outcome) == outcome
+    if found is not None:
+        assert found.final == (outcome != "crashed")
+        assert (found.status == "done") == (outcome == "reached")
+    other = read_end(tmp_path, "another case", "1", {})
+    assert other is None
+
+
 def test_shares_of_a_study_make_the_whole_table(finished, tmp_path):
     file = write(tmp_path)
     run_study(file, tmp_path / "out", Options(jobs=1, only=(1, 2)))

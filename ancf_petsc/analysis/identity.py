@@ -12,7 +12,7 @@ import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,9 @@ from ancf_petsc.launcher import is_general_option
 from ancf_petsc.plan.case_mesh import mesh_file
 
 SHORT = 16  # hexadecimal digits: 64 bits distinguish any number of runs
+PACKAGE = Path(__file__).parents[1]
+WITHOUT_NUMBERS = ("cli", "post", "bench", "studies", "advise", "export", "reduce")
+"""Folders of the program that no number of a run comes from."""
 BLOCK = 1 << 22  # bytes read at once
 INCLUDES = {  # formats of several files: where a file names another, by the suffix of the first
     ".inp": re.compile(rb"^\*INCLUDE\s*,\s*INPUT\s*=\s*(?P<name>[^,\r\n]+)", re.IGNORECASE | re.MULTILINE),
@@ -46,8 +49,22 @@ class Identity:
         return _digest(f"{self.case} {self.mesh}".encode())[:SHORT]
 
     def of_program(self, version: str | None = None) -> str:
-        """Of both and the program's version: the name of a run whose numbers may be taken from a shelf."""
-        return _digest(f"{self.case} {self.mesh} {version or program_version()}".encode())[:SHORT]
+        """Of both and the program: the name of a run whose numbers may be used again. version: default that of this program, and its
+        source as it is now.
+        """
+        program = version or f"{program_version()} {source_digest()}"
+        return _digest(f"{self.case} {self.mesh} {program}".encode())[:SHORT]
+
+
+@cache
+def source_digest() -> str:
+    """Of the program's files that numbers come from: between two releases they change under one version."""
+    digest = sha256()
+    for file in sorted(PACKAGE.glob("**/*.py")):
+        place = file.relative_to(PACKAGE)
+        if place.parts[0] not in WITHOUT_NUMBERS:
+            digest.update(place.as_posix().encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()
 
 
 def identity(case: Case) -> Identity:

@@ -109,7 +109,7 @@ def _checked(
         spec = CaseSpec.model_validate(frozen)
         check(spec)
     except ValidationError as error:
-        raise case_error(error, frozen, source, label or file or name) from None
+        raise case_error(error, frozen, source, label or file or name, CaseSpec) from None
     return Case(spec, file, folder, name, toml.write(data))
 
 

@@ -39,7 +39,7 @@ def case_error(
     data: dict[str, Any],
     source: dict[str, Any],
     file: str | Path | None,
-    root: type[BaseModel] = CaseSpec,
+    root: type[BaseModel],
     page: str = FORMAT_PAGE,
 ) -> CaseError:
     """The first problem of `error` as a CaseError; misspelt keys first: they explain what is missing.

@@ -11,6 +11,8 @@ from typing import Any
 from ancf_petsc.errors import CaseError, EnvironmentProblem, Interrupted, NoEquilibrium
 
 FINAL_CODES = (0, NoEquilibrium.exit_code)
+PASSING = ("", "environment", "interrupted")
+"""Kinds of ends that another attempt may not have."""
 OUTCOMES = {CaseError.exit_code: "wrong_input", EnvironmentProblem.exit_code: "crashed"}
 
 
@@ -44,7 +46,7 @@ def read_end(folder: Path, identity: str, version: str, record: dict[str, Any]) 
         return RunEnd("done", "cut_steps" if cut else kind or "reached", "", summary, final=True)
     if code == Interrupted.exit_code or status == "interrupted":
         return None
-    if status == "stopped" and (code in FINAL_CODES or code is None and kind):
+    if status == "stopped" and (code in FINAL_CODES or code is None and kind not in PASSING):
         said = one_line(str(end.get("message") or summary.get("reason") or reason))
         return RunEnd("failed", kind or "stopped", said, summary, final=True)
     if code is None or code == 0:

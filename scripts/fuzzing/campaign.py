@@ -21,9 +21,11 @@ from fuzzing.tally import SHARES, outcome, shown, tally
 
 RESULTS = PROJECT / "docs" / "verification" / "fuzz.json"
 LONGEST = 10.0
-"""Seconds of processor time that an input may take; the machine may have other work, so that it waits for PATIENCE."""
+"""Seconds of processor time that an input may take."""
 PATIENCE = 60.0
-STARTING = 120.0
+"""Seconds in which none of a worker's processes has had anything to do: it waits for something that never comes."""
+LOOK = 5.0
+STARTING = 900.0
 
 
 class Worker:
@@ -61,9 +63,7 @@ class Worker:
         try:
             self.process.stdin.write(json.dumps([kind, seed, number]) + "\n")
             self.process.stdin.flush()
-            line = _line(
-                self.process, longest + PATIENCE
-            )  # making the input, and the second reader, take time too
+            line = self._answer(self.process, longest)
         except BrokenPipeError:
             line = ""
         if line:
@@ -78,6 +78,17 @@ class Worker:
         unknown = {"grown": 0, "said": "", "second": "", "damage": ["unknown"], "words": []}
         return {"code": what, "seconds": seconds, "busy": seconds, "wrong": wrong, **unknown}
 
+    def _answer(self, process: subprocess.Popen, longest: float) -> str | None:
+        """A line of the worker, empty where it has ended, None where it takes too long or waits for ever."""
+        begun, still = session_load(process.pid)[0], 0.0
+        while (line := _line(process, LOOK)) is None:
+            busy, running = session_load(process.pid)
+            still = 0.0 if running else still + LOOK
+            # Making the input, and the second reader, take time too.
+            if busy - begun > 2 * longest + 10.0 or still > PATIENCE:
+                return None
+        return line
+
     def stop(self, *, dying: bool = False) -> int | None:
         if self.process is None:
             return None
@@ -88,6 +99,18 @@ class Worker:
                     process.wait(5.0)
             process.kill()
         return process.returncode
+
+
+def session_load(session: int) -> tuple[float, bool]:
+    """Seconds of processor time of the processes of a session, and whether one of them has something to do."""
+    busy, running = 0, False
+    for place in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError, IndexError, ValueError):
+            words = place.read_text().rpartition(")")[2].split()
+            if int(words[3]) == session:
+                busy += sum(int(word) for word in words[11:15])
+                running |= words[0] in "RD"
+    return busy / os.sysconf("SC_CLK_TCK"), running
 
 
 def _line(process: subprocess.Popen, seconds: float) -> str | None:

@@ -17,6 +17,12 @@ VTK_TYPES = {"3413": 10, "3813": 12}
 GMSH_TYPES = {"3413": 4, "3813": 5}
 
 
+PLACED = re.compile(
+    rb"(?:^|[\r\n])[^\w*]*\*\s*(?:PART|INSTANCE|SYSTEM|NCOPY|NGEN|NFILL|ELGEN|ELCOPY|INCLUDE)", re.IGNORECASE
+)
+"""Keywords of decks that meshio passes over."""
+
+
 class Unsupported(Exception):
     """The second reader does not read this, or not the same things."""
 
@@ -43,11 +49,8 @@ def _gmsh(path: Path, element: str) -> np.ndarray:
 def _meshio(path: Path, element: str) -> np.ndarray:
     import meshio
 
-    if path.suffix == ".inp" and re.search(
-        rb"^\s*\*\s*(PART|INSTANCE|SYSTEM|NCOPY|NGEN|NFILL|ELGEN|ELCOPY|INCLUDE)",
-        path.read_bytes(),
-        re.IGNORECASE | re.MULTILINE,
-    ):
+    text = path.read_bytes().replace(b"\0", b"")  # of UTF-16 too
+    if path.suffix == ".inp" and PLACED.search(text):
         raise Unsupported("meshio knows none of these")
     mesh = meshio.read(path)
     cells = [block.data for block in mesh.cells if block.type == MESHIO_NAMES[element]]

@@ -192,7 +192,7 @@ def _start_quickly() -> None:
 
 def _warm(room: Room, watch: Watch, kind: str) -> None:
     """Load what a kind of input needs, so that its memory does not count as an input's and copies of this process have it."""
-    for number in range(8 if kind == "results" else 1):
+    for number in range(3 if kind == "results" else 1):
         room.clean()
         attempt = Attempt(room, kind, 0, 0)
         attempt.random.seed(number)

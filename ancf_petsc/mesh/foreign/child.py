@@ -1,4 +1,4 @@
-"""The process that reads one file: `main` with the reader's name, the file, seconds it may take, and words for the reader.
+"""The process that reads one file: `main` with the reader's name, the file, seconds of processor time, and words for the reader.
 
 What it sends to standard output: "ready", and then what `wire` makes of the contents, or the reason of a refusal as text.
 """
@@ -44,7 +44,7 @@ def _answer(words: list[str], out) -> tuple[int, list[bytes]]:
     try:
         for size in (os.path.getsize, guard.check):  # of the file, then of all that belong to it
             allowed = limits.allowed_bytes(Path(path), size(Path(path)))
-            limits.limit(allowed, 10 * float(seconds))
+            limits.limit(allowed, float(seconds))
         return 0, wire.encode(reader.contents(Path(path), rest))
     except MemoryError:
         return NO_MEMORY, [str(allowed).encode()]

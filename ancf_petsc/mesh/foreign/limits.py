@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import resource
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -18,11 +19,11 @@ def allowed_bytes(path: Path, size: int) -> int:
 
 
 def limit(memory: int, seconds: float) -> None:
-    """Set limits on this process. memory: bytes beyond what it has now. seconds: of processor time."""
+    """Set limits on this process, beyond what it has taken so far: memory in bytes, seconds of processor time."""
     used = _address_space()
     if used is not None:
         _set(resource.RLIMIT_AS, used + memory)
-    _set(resource.RLIMIT_CPU, int(seconds) + 1)
+    _set(resource.RLIMIT_CPU, int(time.process_time() + seconds) + 1)
     _set(resource.RLIMIT_CORE, 0)
     _set(resource.RLIMIT_FSIZE, 0)
 

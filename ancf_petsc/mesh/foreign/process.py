@@ -24,7 +24,9 @@ CURES = {
 STARTING = 120.0
 """Seconds a process may take to load a library: network drives are slow."""
 PATIENCE, SLOWEST = 8.0, 1e5
-"""Seconds, and bytes a second: damaged counts keep libraries busy for ever; they read whole files a hundred times faster."""
+"""Seconds of processor time, and bytes a second: damaged counts keep libraries busy for ever; whole files take a hundredth."""
+WAITING = 15.0
+"""Times as long may pass on a machine that has other work."""
 LONGEST_REASON = 300
 """Letters of what a library says."""
 TITLES = {"gmsh": "Gmsh", "meshio": "meshio", "netcdf": "netCDF4"}
@@ -38,12 +40,12 @@ def contents(path: Path, reader: str, *words: str) -> Any:
     size = _size(path)
     seconds = PATIENCE + size / SLOWEST
     with tempfile.TemporaryDirectory(prefix="ancf-") as home:
-        code, said = _run([reader, str(path), f"{seconds:.0f}", *words], home, seconds)
+        code, said = _run([reader, str(path), f"{seconds:.0f}", *words], home, WAITING * seconds)
     if code == 0:
         return wire.decode(said)
     title, cure = TITLES[reader], CURES[reader]
     wrong = mesh_error(path)
-    if code is None:
+    if code in (None, -signal.SIGXCPU):
         raise wrong(f"{title} does not come to an end of it in {seconds:.0f} s", cure=cure)
     reason = " ".join(said.decode("utf-8", "replace").split()) or "no reason given"
     if len(reason) > LONGEST_REASON:
@@ -73,7 +75,7 @@ def _name(code: int) -> str:
 
 
 def _run(words: list[str], home: str, seconds: float) -> tuple[int | None, bytes]:
-    """Exit code, None where it took too long, and what came after "ready"."""
+    """Exit code, None where more than `seconds` passed, and what came after "ready"."""
     process, pipe = start(words, home)
     try:
         begun = _read(pipe, STARTING, len(child.READY))
@@ -123,7 +125,8 @@ def _read(pipe: int, seconds: float, count: int | None = None) -> bytes | None:
     pieces: list[bytes] = []
     left = count
     while left is None or left:
-        if not select.select([pipe], [], [], max(0.0, end - time.monotonic()))[0]:
+        waiting = end - time.monotonic()
+        if waiting <= 0.0 or not select.select([pipe], [], [], waiting)[0]:
             return None
         piece = os.read(pipe, 2**20 if left is None else left)
         if not piece:

@@ -110,7 +110,8 @@ def _draw_front(axes: Axes, front: list[ChartPoint]) -> None:
 
 
 def _front_words(panels: list[ChartPanel]) -> str:
-    return "Grey band: no run is cheaper and more accurate at once (Pareto front)." if panels else ""
+    marked = any(p.best for panel in panels for line in panel.lines for p in line.points)
+    return "Grey band: no run is cheaper and more accurate at once (Pareto front)." if marked else ""
 
 
 def reference_words(study: StudyTable, chart: ChartSpec) -> str:

@@ -36,7 +36,8 @@ TICK_GAP = 0.17
 """Least distance of ticks of a short logarithmic axis, in parts of it."""
 COLUMN, ROW = 4.6, 3.9
 """Inches of a panel."""
-WRAPPED = 118
+NOTE_LETTERS, TITLE_LETTERS = 16.5, 10.0
+"""In an inch."""
 
 
 class LineLook(NamedTuple):
@@ -249,9 +250,11 @@ def plain_heights(axes: Axes, factor: float = 1.0, unit: str = "") -> None:
 
 
 def finish_chart(figure: Figure, title: str, notes: Iterable[str]) -> None:
-    """Title above, notes below."""
-    figure.suptitle(title, x=0.015, ha="left", fontsize=11)
-    lines = [line for note in notes if note for line in textwrap.wrap(note, WRAPPED)]
+    """Title above, notes below, both broken into lines as wide as the figure."""
+    wide = figure.get_size_inches()[0]
+    heading = textwrap.wrap(title, int(TITLE_LETTERS * wide))
+    figure.suptitle("\n".join(heading), x=0.015, ha="left", fontsize=11)
+    lines = [line for note in notes if note for line in textwrap.wrap(note, int(NOTE_LETTERS * wide))]
     if lines:
         figure.supxlabel("\n".join(lines), fontsize=7.5, color=GREY, x=0.015, ha="left")
 

@@ -121,9 +121,12 @@ def panel_rows(study: StudyTable, chart: ChartSpec) -> dict[str, list[StudyRow]]
 
 
 def pareto(lines: Sequence[ChartLine]) -> list[ChartPoint]:
-    """Marks and returns the points that none beats in x and y, in ascending x."""
+    """Marks and returns the points that none beats in x and y, in ascending x; seconds of shared machines do not count."""
     order = sorted(
-        (p.x, p.y, k, i) for k, line in enumerate(lines) for i, p in enumerate(line.points) if p.known
+        (p.x, p.y, k, i)
+        for k, line in enumerate(lines)
+        for i, p in enumerate(line.points)
+        if p.known and p.alone
     )
     best, found = float("inf"), []
     for _, y, k, i in order:
