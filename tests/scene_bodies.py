@@ -47,8 +47,13 @@ CENTRE = (3.0, 4.0)
 OUTER, INNER = 8.0, 3.0
 
 
-def ring_mesh(path: Path, size=3.0, *, axis: int = 2, hollow: float = INNER, notch: float = 0.0) -> Path:
-    """A ring, radii 8 and 3, height 10, about the line through (3, 4) along an axis (their order is cyclic); by Gmsh."""
+def ring_mesh(
+    path: Path, size=3.0, *, axis: int = 2, hollow: float = INNER, notch: float = 0.0, rotation=None
+) -> Path:
+    """A ring, radii 8 and 3, height 10, about the line through (3, 4) along an axis (their order is cyclic); by Gmsh.
+
+    rotation (3, 3): of all of it, about the origin.
+    """
     with gmsh_session(
         **{"Mesh.MeshSizeMax": size, "Mesh.MeshSizeMin": size, "Mesh.MshFileVersion": 2.2}
     ) as gmsh:
@@ -68,6 +73,8 @@ def ring_mesh(path: Path, size=3.0, *, axis: int = 2, hollow: float = INNER, not
         gmsh.model.addPhysicalGroup(3, [tag for _, tag in gmsh.model.getEntities(3)], 1, "body")
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.affineTransform(turn(axis))
+        if rotation is not None:
+            gmsh.model.mesh.affineTransform(np.hstack((rotation, np.zeros((3, 1)))).ravel().tolist())
         gmsh.write(str(path))
     return path
 

@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="H",
         help="length of edges of a section or wedge (default that of the body's)",
     )
-    parser.add_argument("--angle", type=float, metavar="DEGREES", help="of a wedge, up to 90 (default 10)")
+    parser.add_argument("--angle", type=float, metavar="DEGREES", help="of a wedge, up to 90 (default 5)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="the folder to write (default NAME-TO)")
 
 

@@ -29,7 +29,7 @@ def plane_normals(plan: Plan, spec: CaseSpec) -> dict[str, Floats]:
 
 def axes_held(row: ConstraintSpec, normals: dict[str, Floats]) -> list[str]:
     """The axes that a support's `fix` holds, that of a plane normal to one among them."""
-    axes = [axis for axis in row.fix if axis in AXES]
+    axes: list[str] = [axis for axis in row.fix if axis != "normal"]
     along = axis_of(normals[row.group]) if "normal" in row.fix else None
     return axes if along is None or AXES[along] in axes else [*axes, AXES[along]]
 
@@ -45,7 +45,7 @@ def equations(plan: Plan, spec: CaseSpec, normals: dict[str, Floats]) -> Iterato
     prescribed = np.zeros((len(plan.mesh.points), 3), bool)
     for row in spec.constraint:
         axes = [AXES.index(axis) for axis in (*axes_held(row, normals), *row.move)]
-        prescribed[np.ix_(plan.mesh.groups[row.group].nodes, axes)] = True
+        prescribed[plan.mesh.groups[row.group].nodes[:, None], axes] = True
     member = np.stack(
         [np.isin(np.arange(len(prescribed)), plan.mesh.groups[name].nodes) for name in oblique], axis=1
     )

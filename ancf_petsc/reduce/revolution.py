@@ -6,14 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from ancf_petsc.reduce.actions import SAME, SceneAction, directions, targets
 from ancf_petsc.reduce.shape import CLOSE, Floats, Simplices, departure
-from ancf_petsc.reduce.symmetry import MirrorPlane, SceneModel, flat_normal, place
+from ancf_petsc.reduce.symmetry import MirrorPlane, SceneModel, different, flat_normal, place
 
 TURNS = (0.1180, 0.2639, 0.3820, 0.5279, 0.6459, 0.7639, 0.9098)
 """Parts of the sector by which a body is rotated to see whether it stays what it is; no two are in a simple ratio."""
 WHOLE = 2.0 * np.pi
+NEAR = 1e-3
+"""Of a cosine: directions within 2.6 degrees of a principal axis of a coarse mesh may be that of the body."""
 
 
 @dataclass(frozen=True)
@@ -94,20 +97,45 @@ def _candidates(scene: SceneModel) -> list[Ring]:
                 found.append((point, axis / np.linalg.norm(axis)))
     for _, plane in walls:
         found += [
-            (scene.centre - plane.heights(scene.centre[None])[0] * plane.normal, axis)
+            (point - plane.heights(point[None])[0] * plane.normal, axis)
             for axis in _directions(scene)
+            for point in _middles(scene, axis)
         ]
-    found += [(scene.centre, axis) for axis in _directions(scene)]
+    found += [(point, axis) for axis in _directions(scene) for point in _middles(scene, axis)]
     return [ring for point, axis in found if (ring := _sector(scene, point, axis, walls)) is not None]
 
 
+def _middles(scene: SceneModel, axis: Floats) -> list[Floats]:
+    """Points an axis may go through: the centre of the circle that the outermost nodes lie on, if they do, and the body's middle.
+
+    A half has the circle of the whole; the middle is that of the body but for chords.
+    """
+    across = np.linalg.svd(axis[None])[2][1:].T
+    flat = (scene.mesh.points[np.unique(scene.surface.facets)] - scene.centre) @ across
+    outermost = flat[ConvexHull(flat).vertices]
+    system = np.column_stack((2.0 * outermost, np.ones(len(outermost))))
+    (u, v, _), *_ = np.linalg.lstsq(system, (outermost**2).sum(axis=1), rcond=None)
+    if np.ptp(np.linalg.norm(outermost - [u, v], axis=1)) > CLOSE * scene.size:
+        return [scene.centre]
+    way = across @ [u, v]
+    return [scene.centre + np.where(np.abs(way) <= CLOSE * scene.size, 0.0, way), scene.centre]
+
+
 def _directions(scene: SceneModel) -> list[Floats]:
-    """The axes, and the principal axis whose moment differs from two equal ones."""
+    """The principal axis whose moment differs from two equal ones, and the axes.
+
+    Moments of a mesh are those of the body but for chords: before it stand the directions near it that are known, axes, normals of
+    flat groups, directions of loads.
+    """
     values, vectors = np.linalg.eigh(scene.inertia)
     odd = 0 if abs(values[2] - values[1]) < abs(values[1] - values[0]) else 2
     own = vectors[:, odd] * np.sign(vectors[np.abs(vectors[:, odd]).argmax(), odd])
     axes = [np.eye(3)[i] for i in np.argsort(-np.abs(own))]
-    return axes if np.abs(own).max() > 1.0 - CLOSE else [own, *axes]
+    flat = [normal for action in scene.actions if (normal := flat_normal(action.shape)) is not None]
+    loads = [action.amount for action in scene.actions] + [vector for _, vector, _ in directions(scene.case)]
+    known = [*axes, *flat, *(vector / np.linalg.norm(vector) for vector in loads if vector.any())]
+    near = [vector for vector in known if abs(vector @ own) > 1.0 - NEAR]
+    return different([*near, own, *axes])
 
 
 def _sector(

@@ -144,7 +144,7 @@ def candidates(scene: SceneModel) -> list[MirrorPlane]:
     gaps = np.abs(values[:, None] - values) + np.eye(3) * values.max()
     own = [vectors[:, k] for k in range(3) if gaps[k].min() > DISTINCT * values.max()]
     flat = [normal for action in scene.actions if (normal := flat_normal(action.shape)) is not None]
-    first = _different([*np.eye(3), *own, *flat])
+    first = different([*np.eye(3), *own, *flat])
     between = [
         sign * b + a
         for i, a in enumerate(first)
@@ -154,7 +154,7 @@ def candidates(scene: SceneModel) -> list[MirrorPlane]:
     ]
     return [
         MirrorPlane(scene.centre, normal)
-        for normal in _different([*first, *(v / np.sqrt(2.0) for v in between)])
+        for normal in different([*first, *(v / np.sqrt(2.0) for v in between)])
     ]
 
 
@@ -167,7 +167,7 @@ def flat_normal(shape: Simplices) -> Floats | None:
     return vectors[2] if sizes[2] <= CLOSE * sizes[0] else None
 
 
-def _different(normals: list[Floats]) -> list[Floats]:
+def different(normals: list[Floats]) -> list[Floats]:
     """Unit normals without those that repeat an earlier one up to its sign."""
     kept: list[Floats] = []
     for normal in normals:

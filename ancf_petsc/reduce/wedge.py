@@ -19,7 +19,7 @@ from ancf_petsc.reduce.sweep import swept
 from ancf_petsc.reduce.symmetry import SceneModel
 from ancf_petsc.reduce.tables import SmallerCase, free_name, tables_and_mesh
 
-NARROW, WIDEST = 10.0, 90.0
+NARROW, WIDEST = 5.0, 90.0
 """Degrees: of a wedge where none are given, and at most."""
 KEPT, OTHERWISE = ("3413", "3-10-1-3"), "3-10-1-3"
 """Elements of tetrahedra that a wedge keeps, and the one in place of another."""

@@ -21,7 +21,7 @@ KINDS_OF_PARTS = (*HALVES, QUARTER, SECTION, WEDGE)
 
 
 def reduce(case: Case, to: str, size: float | None = None, angle: float | None = None) -> SmallerCase:
-    """The smaller case of a kind. size: length of edges of a section or wedge, by default those of the body. angle: of a wedge, degrees.
+    """The smaller case of a kind. size: length of edges of a section or wedge (None: as the body's). angle: of a wedge, in degrees.
 
     Raises CaseError where the scene does not allow it, with the reason.
     """
