@@ -65,7 +65,7 @@ def _strict_base64() -> Iterator[None]:
             raise ValueError("its packed numbers are no base64")
         return lenient(letters, *rest, **more)
 
-    base64.b64decode = decode
+    base64.b64decode = decode  # type: ignore[assignment]
     try:
         yield
     finally:
