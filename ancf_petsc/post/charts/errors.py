@@ -28,7 +28,11 @@ from ancf_petsc.post.charts.words import axis_words, title_of
 from ancf_petsc.post.panels import style
 from ancf_petsc.post.units import with_unit
 
-COSTS = {"seconds": ("total_seconds", "seconds of the whole run"), "dof": ("dof", "degrees of freedom")}
+COSTS = {
+    "solve_seconds": ("solve_seconds", "seconds of the solution"),
+    "seconds": ("total_seconds", "seconds of the whole run"),
+    "dof": ("dof", "degrees of freedom"),
+}
 HOLLOW = "Hollow: seconds of a run that shared the machine's cores with others."
 
 
@@ -48,7 +52,7 @@ def precision_panels(study: StudyTable, chart: ChartSpec) -> list[ChartPanel]:
         panel = ChartPanel("", words, _error_words(study, chart))
         for label, rows in grouped(study, select(study, chart.only), chart).items():
             points = [
-                error_point(row, quantity, row.number(column), alone=cost != "seconds" or row.alone)
+                error_point(row, quantity, row.number(column), alone=cost == "dof" or row.alone)
                 for row in rows
             ]
             panel.lines.append(ChartLine(label, points, down=True))

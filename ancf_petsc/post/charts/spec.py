@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from ancf_petsc.input.types import Name, Table, key, problem
 
 Kind = Literal["work_precision", "convergence", "map", "values", "curves", "profile"]
-Cost = Literal["seconds", "dof"]
+Cost = Literal["solve_seconds", "seconds", "dof"]
 Scale = Literal["linear", "log"]
 Abscissa = Literal["linear", "log", "even"]
 
@@ -86,7 +86,9 @@ class ChartSpec(Table):
     y_scale: Scale | None = key('"linear" or "log"', None)
     predicted: tuple[PredictedSpec, ...] = key("a list of tables; what was predicted", ())
     cost: Annotated[tuple[Cost, ...], BeforeValidator(_several)] = key(
-        'a list out of "seconds", "dof"; such as ["seconds"]', ("seconds", "dof"), min_length=1
+        'a list out of "solve_seconds", "seconds" (of the whole run), "dof"; such as ["seconds"]',
+        ("solve_seconds", "dof"),
+        min_length=1,
     )
     factor: float | None = key(
         "a number > 0; of a map, the value of quantity from which energy has grown", None, gt=0
