@@ -188,6 +188,20 @@ def test_error_and_cost_beyond_what_was_run():
     assert max(line.candidates()) == 2.0
 
 
+def test_sizes_that_give_one_mesh_or_a_coarser_one_are_no_levels():
+    """A mesh generator makes one mesh of several sizes of edges on coarse bodies, and now and then a coarser one of a smaller size."""
+    line = made("3443", error=0.1, order=2.0, rate=1e-4, levels=(0, 1, 2, 3), cells=3000)
+    whole = {level: line.error(level, -100.0) for level in (2.5, 5.0)}
+    line.trials[2.25], line.trials[1.5] = line.trials[2.0], line.trials[0.0]
+    assert line.rungs == [0.0, 1.0, 2.0, 3.0]
+    for level, error in whole.items():
+        assert line.error(level, -100.0) == pytest.approx(error, rel=1e-9)
+    line.trials = {0.0: line.trials[0.0], 1.0: line.trials[0.0]}
+    assert line.error(2.0, -100.0) == np.inf
+    assert np.isfinite(line.dof_at(2.0) + line.seconds(2.0))
+    assert line.limit(NoLab()).limit is None
+
+
 def test_the_cheapest_that_is_good_enough():
     slow = made("3843", error=0.02, order=4.0, rate=1e-3)
     fast = made("3413", error=0.30, order=2.0, rate=1e-5)

@@ -46,7 +46,7 @@ class Choice:
 
 def best_guess(lines: Sequence[Discretisation], lab: Lab) -> BestGuess | None:
     """The limit of the ladder that is least uncertain; where none converges, where the best of them leads."""
-    found = [(line, line.limit(lab)) for line in lines if len(line.trials) >= 3]
+    found = [(line, line.limit(lab)) for line in lines if len(line.rungs) >= 3]
     good = [(line, limit) for line, limit in found if limit.verdict == ASYMPTOTIC and limit.limit]
     if good:
         line, limit = min(good, key=lambda pair: pair[1].uncertainty or 0.0)
@@ -67,7 +67,7 @@ def best_guess(lines: Sequence[Discretisation], lab: Lab) -> BestGuess | None:
 
 def _of_finest(lines: Sequence[Discretisation]) -> BestGuess | None:
     """The finest trial of the highest order whose last step was the smallest, as uncertain as twice that step."""
-    long = [line for line in lines if len(line.trials) >= 2 and line.values[-1] != 0.0]
+    long = [line for line in lines if len(line.rungs) >= 2 and line.values[-1] != 0.0]
     if not long:
         return None
     highest = max(line.order for line in long)

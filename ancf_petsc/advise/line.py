@@ -20,6 +20,8 @@ AHEAD = {1: 1.0, 2: 4.0, 3: 6.0}
 """Levels beyond the finest that errors are predicted for, by the number of trials."""
 FRACTION = 0.25
 """Of a level, where a family has meshes between whole ones."""
+SAME = 1e-6
+"""Sizes that differ by less, relatively, are of one mesh."""
 WORTH = 1500
 """Degrees of freedom below which seconds of solutions say nothing of their growth."""
 
@@ -69,8 +71,18 @@ class Discretisation:
         return sorted(self.trials)
 
     @property
+    def rungs(self) -> list[float]:
+        """Levels with smaller elements than all before: of some sizes a mesh generator makes the same mesh, or a coarser one."""
+        found: list[float] = []
+        for level in self.levels:
+            if not found or self.trials[level].facts.h < self.trials[found[-1]].facts.h * (1 - SAME):
+                found.append(level)
+        return found
+
+    @property
     def values(self) -> list[float]:
-        return [self.trials[level].value or 0.0 for level in self.levels]
+        """By rung."""
+        return [self.trials[level].value or 0.0 for level in self.rungs]
 
     @property
     def order(self) -> int:
@@ -79,12 +91,12 @@ class Discretisation:
 
     @property
     def sizes(self) -> list[float]:
-        """Mean sizes of elements, by level."""
-        return [self.trials[level].facts.h for level in self.levels]
+        """Mean sizes of elements, by rung."""
+        return [self.trials[level].facts.h for level in self.rungs]
 
     def limit(self, lab: Lab) -> LadderLimit:
         """What Richardson says of the ladder."""
-        trials = [self.trials[level] for level in self.levels]
+        trials = [self.trials[level] for level in self.rungs]
         if len(trials) < 3:
             return extrapolate(Ladder(self.sizes, self.values))
         seen = [trial.row.stretch_at(lab.asked) for trial in trials]
@@ -93,7 +105,7 @@ class Discretisation:
 
     def doubtful_limit(self) -> float | None:
         """Where the three finest levels lead by themselves, whatever else speaks against a limit."""
-        if len(self.trials) < 3:
+        if len(self.rungs) < 3:
             return None
         h, q = np.array(self.sizes[-3:]), np.array(self.values[-3:])
         if (q[0] - q[1]) * (q[1] - q[2]) <= 0:
@@ -105,7 +117,7 @@ class Discretisation:
         """Relative, at any level: measured where it is, else by the power of h that the finest two levels show."""
         if level in self.trials:
             return abs((self.trials[level].value or 0.0) / reference - 1.0)
-        h, errors = np.array(self.sizes), np.array([self.error(known, reference) for known in self.levels])
+        h, errors = np.array(self.sizes), np.array([self.error(known, reference) for known in self.rungs])
         wanted = self.size_at(level)
         if len(h) < 2:
             return math.inf
@@ -119,7 +131,7 @@ class Discretisation:
 
     def size_at(self, level: float) -> float:
         """The mean size of elements at a level: between and beyond those known it goes geometrically."""
-        known = np.array(self.levels)
+        known = np.array(self.rungs)
         if len(known) == 1:
             return self.sizes[0] * (0.5 if self.family.name == "refined" else 0.8) ** (level - known[0])
         k = int(np.clip(np.searchsorted(known, level) - 1, 0, len(known) - 2))
@@ -130,9 +142,10 @@ class Discretisation:
         """Degrees of freedom at a level, about."""
         if level in self.trials:
             return float(self.trials[level].facts.dof)
-        finest, dimension = self.trials[self.levels[-1]], 3.0
-        if len(self.trials) > 1:
-            before = self.trials[self.levels[-2]].facts
+        rungs = self.rungs
+        finest, dimension = self.trials[rungs[-1]], 3.0
+        if len(rungs) > 1:
+            before = self.trials[rungs[-2]].facts
             dimension = math.log(finest.facts.dof / before.dof) / math.log(before.h / finest.facts.h)
         return finest.facts.dof * (finest.facts.h / self.size_at(level)) ** dimension
 
@@ -140,7 +153,7 @@ class Discretisation:
         """Of a whole run at a level: a constant and a power of the degrees of freedom."""
         if level in self.trials:
             return self.trials[level].seconds
-        trials = [self.trials[known] for known in self.levels]
+        trials = [self.trials[known] for known in self.rungs]
         constant = min(trial.seconds - trial.solution for trial in trials)
         large = [trial for trial in trials if trial.facts.dof >= WORTH and trial.solution > 0]
         growth = USUAL_GROWTH
@@ -158,6 +171,6 @@ class Discretisation:
         first, last = self.levels[0], self.levels[-1]
         step = FRACTION if self.family.fractions else 1.0
         low = first - (1.0 if self.family.fractions else 0.0)
-        high = last + AHEAD[min(len(self.trials), 3)]
+        high = last + AHEAD[min(len(self.rungs), 3)]
         found = [low + step * k for k in range(int((high - low) / step) + 1)]
         return [level for level in found if not self.stopped or level <= last if self.family.mesh(level)]

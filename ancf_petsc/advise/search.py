@@ -100,7 +100,7 @@ def _finer(
     """The next level of the line whose error falls farthest for what it costs."""
     found = []
     for line in lines:
-        if line.stopped or len(line.trials) < 2:
+        if line.stopped or len(line.rungs) < 2:
             continue
         level = line.levels[-1] + 1.0
         if line.family.mesh(level) is None or line.seconds(level) > affordable:
@@ -118,4 +118,4 @@ def _beyond(line: Discretisation, choices: list[Choice], target: float, guess: B
     """Whether a ladder already reaches well beyond the choice: the guess will not become surer by it."""
     finest = line.levels[-1]
     fine = line.error(finest, guess.value) < 0.25 * target
-    return fine and line is not choices[0].line and len(line.trials) >= 4
+    return fine and line is not choices[0].line and len(line.rungs) >= 4
