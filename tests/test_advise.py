@@ -84,6 +84,16 @@ def test_the_path_ends_where_the_quantity_is_taken(tmp_path):
     assert found.curve["force"][-1] == pytest.approx(known.curve["force"][1], rel=1e-8)
 
 
+def test_the_path_ends_at_the_stroke_of_the_sign_asked_for(tmp_path):
+    """Pressed first, then pulled: a stroke of either sign has its own state, and a path that is only pressed has no other."""
+    table = "ramp = [[0.0, 0.0], [0.5, 1.0], [1.0, -1.0]]"
+    both = CASE.replace("move = { z = -0.05 }", f"move = {{ z = -0.05 }}\n{table}")
+    case = ancf.load_case(write(tmp_path, case=both).with_name("case.toml"))
+    for text, factor in (("-0.05", 1.0), ("0.05", -1.0), ("0.025", -0.5), ("-0.025", 0.5)):
+        base, _, _ = working_case(case, read_quantity(f"force@stroke={text}"), tmp_path / f"out{text}")
+        assert base.spec.constraint[1].ramp[1] == (1.0, pytest.approx(factor))
+
+
 def test_what_a_case_has_not_is_refused(tmp_path):
     case = ancf.load_case(write(tmp_path).with_name("case.toml"))
     for text, said in [

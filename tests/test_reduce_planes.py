@@ -116,6 +116,29 @@ def test_a_group_on_one_side_keeps_its_force(tmp_path):
     assert "probe.right: nothing of right is in the part that is kept" in said
 
 
+def test_the_force_of_a_line_in_the_plane_is_that_of_the_whole(tmp_path):
+    """Half of such a line's reaction is in the half: three-point bending takes its force there."""
+    case = box_case(
+        tmp_path,
+        groups={
+            "low": {"plane": "z", "at": "min"},
+            "line": {"box": [[0.99, -1.0, 2.99], [1.01, 2.0, 3.01]]},
+        },
+        constraint=[
+            {"group": "low", "fix": ["x", "y", "z"]},
+            {"group": "line", "fix": ["x", "y"], "move": {"z": -0.1}},
+        ],
+        statics={"steps": 1},
+        output={"curve": {"force": "line.z", "stroke": "line.z"}},
+    )
+    half, notes = smaller(case, "half-x", tmp_path / "half")
+    assert half.spec.output.symmetry == 2
+    assert not any("output.symmetry" in note for note in notes)
+    for column in ("force", "strain_energy", "low.rz"):
+        whole = force(case, tmp_path / f"whole {column}", column)
+        np.testing.assert_allclose(force(half, tmp_path / f"run {column}", column), whole, rtol=1e-7)
+
+
 def test_a_cut_gives_sets_of_nodes_no_new_faces(tmp_path):
     """Nodes through the whole middle of the box carry a force as the faces and points of the whole body that they cover."""
     slab = {"box": [[0.5, 0.0, 1.0], [1.5, 1.0, 2.0]]}

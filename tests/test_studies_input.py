@@ -6,6 +6,8 @@ import pytest
 from tiny_studies import CASE, STUDY, write
 
 from ancf_petsc.cli import main
+from ancf_petsc.input.load import load_case
+from ancf_petsc.studies.columns import columns_of, nearest
 
 MOTION = CASE.replace("[statics]\nsteps = 2", "[dynamics]\nduration = 0.1\nstep = 0.05\noutputs = 2").replace(
     "move = { z = -0.05 }", 'fix = ["y"]'
@@ -173,3 +175,26 @@ def test_combinations_that_no_mesh_fits_are_rows_not_ends(tmp_path):
         runs_of(
             load_study(write(tmp_path / "b", STUDY.replace('["3413", "3-10-1-3"]', '["3813"]'))), tmp_path
         )
+
+
+@pytest.mark.parametrize(
+    ("points", "wanted", "index"),
+    [
+        ((0.005, 0.01, -0.01), -0.01, 2),
+        ((-0.01, 0.01), 0.01, 1),
+        ((-0.005, -0.01), 0.01, 1),
+        ((0.005, 0.01, 0.005), 0.005, 0),
+        ((0.005, 0.01), 0.02, None),
+        ((), 0.02, None),
+    ],
+)
+def test_an_output_of_the_sign_asked_for_comes_before_one_of_the_other(points, wanted, index):
+    assert nearest(points, wanted) == index
+
+
+def test_columns_of_a_path_that_motion_carries_on(tmp_path):
+    """Beyond its limits a path has the energy that was lost and the jumps."""
+    write(tmp_path)
+    spec = load_case(tmp_path / "case.toml").with_changes({"statics.after_limit": "dynamics"}).spec
+    assert {"dissipated_energy", "jumps"} <= set(columns_of(spec))
+    assert "jumps" not in columns_of(load_case(tmp_path / "case.toml").spec)

@@ -128,3 +128,12 @@ def test_an_integrator_shows_its_own_order():
     assert extrapolate(Ladder(steps, [1.0 + e for e in path], exact=2)).verdict == NOT_ASYMPTOTIC
     exact = [1.0 + h**2 for h in sizes]
     assert extrapolate(Ladder(sizes, exact, exact=2)).limit == pytest.approx(1.0, rel=1e-9)
+
+
+def test_a_limit_of_zero_is_zero_not_what_rounding_leaves():
+    """Errors are relative to a limit, and to zero they are absolute."""
+    sizes = [1.0, 0.5, 0.25, 0.125]
+    found = extrapolate(Ladder(sizes, [0.4 * h**2 for h in sizes]))
+    assert found.verdict == ASYMPTOTIC
+    assert found.limit == 0.0
+    assert found.gap == pytest.approx(0.4 / 64, rel=1e-9)

@@ -12,7 +12,9 @@ from tiny_studies import CASE, STUDY, InProcess, lasting, table, write
 from ancf_petsc.cli import main
 from ancf_petsc.errors import CaseError
 from ancf_petsc.studies import runner
+from ancf_petsc.studies.quantity import Tables, value_of
 from ancf_petsc.studies.record import held, record_file
+from ancf_petsc.studies.spec import QuantitySpec
 from ancf_petsc.studies.study import Options, run_study
 
 
@@ -199,6 +201,15 @@ def test_references_by_number_file_and_a_further_run(finished, tmp_path):
     (tmp_path / "known.csv").write_text("stroke,force\n0,0\n-0.02,-2.0\n")
     with pytest.raises(CaseError, match="reference.force.*no output at stroke 0.025"):
         run_study(tmp_path / "study.toml", tmp_path / "out")
+
+
+@pytest.mark.parametrize(("text", "reduce"), [("nan", "max"), ("inf", "mean")])
+def test_a_number_that_is_not_finite_is_none(text, reduce, tmp_path):
+    """It would end Richardson's fit, or be the limit of everything."""
+    (tmp_path / "known.csv").write_text(f"stroke,force\n0,0\n0.1,{text}\n")
+    for asked in (QuantitySpec(column="force", at="end"), QuantitySpec(column="force", reduce=reduce)):
+        with pytest.raises(CaseError, match="known.csv: not a finite number"):
+            value_of(asked, Tables(tmp_path / "known.csv"))
 
 
 def test_series_against_a_reference(tmp_path):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ancf_petsc.errors import CaseError, writing
 from ancf_petsc.input import toml
 from ancf_petsc.input.load import Case, load_case
@@ -62,7 +64,7 @@ def _pseudo_time(case: Case, asked: QuantitySpec, at: OutputAt) -> float:
 
 
 def _time_of_stroke(case: Case, stroke: float) -> float | None:
-    """The pseudo-time at which the driven group first comes to a stroke, None where it is not driven that far."""
+    """The pseudo-time at which the driven group first comes to a stroke, else to that of the other sign; None where to neither."""
     curve = case.spec.output.curve
     if curve is None:
         return None
@@ -70,10 +72,9 @@ def _time_of_stroke(case: Case, stroke: float) -> float | None:
     drivers = [row for row in case.spec.constraint if row.group == curve.stroke.group and row.move.get(axis)]
     if not drivers:
         return None
-    ramp, factor = make_ramp(drivers[0].ramp, "linear"), abs(stroke / drivers[0].move[axis])
-    factor = min(factor, 1.0) if factor <= 1 + 1e-12 else factor
-    found = [s for s in (ramp.first_time(factor), ramp.first_time(-factor)) if s]
-    return min(found, default=None)
+    ramp, factor = make_ramp(drivers[0].ramp, "linear"), stroke / drivers[0].move[axis]
+    factor = float(np.clip(factor, -1.0, 1.0)) if abs(factor) <= 1 + 1e-12 else factor
+    return next((s for s in (ramp.first_time(factor), ramp.first_time(-factor)) if s), None)
 
 
 def _cut(data: dict[str, Any], case: Case, end: float) -> None:

@@ -183,7 +183,7 @@ def _outputs(smaller: SmallerCase, before: Mesh, plane: MirrorPlane) -> None:
     divided = True
     if curve:
         group, _, axis = curve["force"].rpartition(".")
-        divided = _is_divided(before, group, plane, slack)
+        divided = _is_halved(before, group, plane, slack)
         if divided and plane.axis == AXES.index(axis):
             smaller.notes.append(
                 f"output.curve.force: along {axis}, across the plane, forces of both parts cancel in the whole body"
@@ -192,7 +192,8 @@ def _outputs(smaller: SmallerCase, before: Mesh, plane: MirrorPlane) -> None:
         output["symmetry"] = 2 * output.get("symmetry", 1)
     else:
         smaller.notes.append(
-            "output.symmetry stays: the group of output.curve.force lies on one side; energies and work are those of the part"
+            "output.symmetry stays: the group of output.curve.force does not go on beyond the plane; energies and work are those "
+            "of the part, and of what the group has on the plane itself only half the force is counted"
         )
     kept = [row for row in data.get("probe", []) if _left(smaller, row["group"], f"probe.{row['name']}")]
     smaller.notes.extend(
@@ -204,6 +205,12 @@ def _outputs(smaller: SmallerCase, before: Mesh, plane: MirrorPlane) -> None:
         data["probe"] = kept
     else:
         data.pop("probe", None)
+
+
+def _is_halved(mesh: Mesh, group: str, plane: MirrorPlane, slack: float) -> bool:
+    """Whether the part has half of a group's reaction: of one that goes on beyond the plane, or that lies on it."""
+    heights = plane.heights(mesh.points[mesh.groups[group].nodes])
+    return _is_divided(mesh, group, plane, slack) or bool(np.abs(heights).max() <= slack)
 
 
 def _is_divided(mesh: Mesh, group: str, plane: MirrorPlane, slack: float) -> bool:

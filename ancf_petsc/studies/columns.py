@@ -25,6 +25,8 @@ def columns_of(spec: CaseSpec) -> tuple[str, ...]:
     if spec.output.curve:
         names += ["stroke", "force", "force_stress_area"]
     names += ["strain_energy", "external_work", "min_det_F", *COUNTED]
+    if spec.statics and spec.statics.after_limit == "dynamics":
+        names += ["dissipated_energy", "jumps"]
     if spec.dynamics:
         names += MOTION
         names += [f"{what}.{axis}" for what in ("momentum", "angular_momentum") for axis in AXES]
@@ -89,12 +91,15 @@ def _strokes(spec: CaseSpec, times: Sequence[float] | None, column: str) -> list
 
 
 def nearest(points: Sequence[float], wanted: float) -> int | None:
-    """Index of the first of the points that is the wanted one, whatever its sign, None where none is."""
-    scale = max((abs(point) for point in points), default=0.0)
-    for index, point in enumerate(points):
-        if abs(abs(point) - abs(wanted)) <= SAME * max(scale, abs(wanted)):
-            return index
-    return None
+    """Index of the first of the points that is the wanted one, else of the first that is it but for its sign, None for none."""
+    slack = SAME * max((abs(point) for point in (*points, wanted)), default=0.0)
+    found = (
+        index
+        for size in (float, abs)
+        for index, point in enumerate(points)
+        if abs(size(point) - size(wanted)) <= slack
+    )
+    return next(found, None)
 
 
 def shown(column: str, points: Sequence[float]) -> str:

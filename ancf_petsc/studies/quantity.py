@@ -67,7 +67,14 @@ class Tables:
 
 
 def value_of(asked: QuantitySpec, tables: Tables, reference: Tables | None = None) -> float:
-    """The number asked for. reference: what a series is compared with. Raises CaseError where there is none."""
+    """The number asked for. reference: what a series is compared with. Raises CaseError where there is none that is finite."""
+    value = _taken(asked, tables, reference)
+    if not np.isfinite(value):
+        raise CaseError("not a finite number", file=tables.source, got=value, expected="a number")
+    return value
+
+
+def _taken(asked: QuantitySpec, tables: Tables, reference: Tables | None) -> float:
     if asked.summary is not None:
         return _from_summary(asked.summary, tables)
     assert asked.column is not None

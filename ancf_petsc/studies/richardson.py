@@ -13,7 +13,7 @@ order that growing strains predict, where that is lower than the order seen.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,6 +90,8 @@ def extrapolate(ladder: Ladder) -> LadderLimit:
     if problem:
         return _refused(problem)
     found = _limit(h, q, triples, stretch)
+    if found.limit is not None and abs(found.limit) <= EQUAL * scale:
+        found = replace(found, limit=0.0)  # what is left is rounding, and nothing is relative to it
     exact = ladder.exact
     seen = [found.order, *(triple[0] for triple in triples[-1:] if triple)]
     odd = [order for order in seen if exact and order and abs(order - exact) > NEAR]
