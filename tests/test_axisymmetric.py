@@ -23,6 +23,7 @@ from ancf_petsc.mesh.kinds import KUHN
 from ancf_petsc.mesh.read import read_mesh
 from ancf_petsc.model.assembly import Assembly
 from ancf_petsc.model.mass import Mass
+from ancf_petsc.model.measures import mean_stress
 from ancf_petsc.plan.plan import make_plan
 from ancf_petsc.solve.modes import modes_at
 
@@ -268,6 +269,22 @@ def test_a_force_is_spread_over_the_ring_and_areas_are_those_swept(code, tmp_pat
     assert results.curve["force_stress_area"][-1] == pytest.approx(-0.1 * area, rel=1e-9)
     assert results.curve["force"][-1] == pytest.approx(0.1 * area, rel=1e-9)
     assert results.probes["top.x"][-1] == pytest.approx((2**3 - 1) / 3 / (3 / 2), rel=1e-12)
+
+
+def test_nodes_count_as_their_rings_in_the_mean_stress(tmp_path):
+    """A stress that grows with the radius, on a disc with its axis: the mean over nodes would be 1/2, over the area 2/3."""
+    data = ring(
+        section("2-6-1-2", 8, tmp_path, low=(0.0, 0.0)),
+        "2-6-1-2",
+        constraint=[{"group": "bottom", "fix": ["z"]}],
+        output={"curve": {"force": "top.z", "stroke": "top.z"}},
+    )
+    built = build(case_from_dict(data, tmp_path), MPI.COMM_SELF)
+    body = built.model
+    corners = body.cells[:, :3]
+    stress = np.zeros((len(corners), 9))
+    stress[:, 8] = body.reference[corners, 0].mean(axis=1)
+    assert mean_stress(Assembly(body), stress, "top", 2) == pytest.approx(2 / 3, rel=0.02)
 
 
 @each_element

@@ -26,7 +26,10 @@ def mean_position(assembly: Assembly, x: PETSc.Vec, name: str) -> tuple[NDArray,
 
 
 def mean_stress(assembly: Assembly, cauchy: NDArray, group: str, axis: int) -> float:
-    """Cauchy stress (axis, axis), averaged to nodes by undeformed volume, mean over the group's nodes."""
+    """Cauchy stress (axis, axis), averaged to nodes by undeformed volume, mean over the group's nodes.
+
+    Around a body of revolution a node stands for a ring, and counts as its undeformed radius.
+    """
     model = assembly.model
     a = model.cells.shape[1]
     weight = np.repeat(model.volumes, a)
@@ -35,9 +38,12 @@ def mean_stress(assembly: Assembly, cauchy: NDArray, group: str, axis: int) -> f
     volumes = np.bincount(model.cells.ravel(), weight, minlength=n)
     sums = np.bincount(model.cells.ravel(), stress, minlength=n)
     nodes = model.groups[group]
-    own = np.array([(sums[nodes] / volumes[nodes]).sum(), len(nodes)])
+    counts = np.ones(len(nodes))
+    if model.revolution is not None:  # whose radii have the file's origin
+        counts = model.reference[nodes, model.revolution.radial]
+    own = np.array([counts @ (sums[nodes] / volumes[nodes]), counts.sum()])
     total, count = combined(assembly.comm, own)
-    return total / count
+    return total / count if count else 0.0
 
 
 def conjugates(assembly: Assembly, x: PETSc.Vec, out_of_balance: NDArray) -> tuple[NDArray, NDArray]:
