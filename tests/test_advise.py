@@ -199,7 +199,7 @@ def test_error_and_cost_beyond_what_was_run():
 
 
 def test_sizes_that_give_one_mesh_or_a_coarser_one_are_no_levels():
-    """A mesh generator makes one mesh of several sizes of edges on coarse bodies, and now and then a coarser one of a smaller size."""
+    """A mesh generator makes one mesh of several sizes of edges on coarse bodies, and at times a coarser one of a smaller size."""
     line = made("3443", error=0.1, order=2.0, rate=1e-4, levels=(0, 1, 2, 3), cells=3000)
     whole = {level: line.error(level, -100.0) for level in (2.5, 5.0)}
     line.trials[2.25], line.trials[1.5] = line.trials[2.0], line.trials[0.0]
