@@ -403,14 +403,18 @@ def test_failures_are_named_where_nothing_reaches(tmp_path, monkeypatch, capsys)
     )
     said = capsys.readouterr().out
     assert code == 3
-    assert "nothing that could be tried is within 5 %" in said
+    assert "nothing can be advised: too few runs came to the end to estimate what errors are against" in said
     assert "3813, bricks ends early: " in said
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--quantity", "forse", "--within", "1%"], "quantity.quantity.column: no such column"),
+        (["--quantity", "forse", "--within", "1%"], "error: --quantity: no such column: found 'forse'"),
+        (
+            ["--quantity", "force@stroke=0.06", "--within", "1%"],
+            "the path ends at a stroke of 0.05: ask for one up to there",
+        ),
         (["--quantity", "force", "--within", "1"], "--within: found '1'"),
         (["--quantity", "force@stroke=x", "--within", "1%"], "--quantity: found 'force@stroke=x'"),
         (["--quantity", "force", "--within", "1%", "--budget", "0"], "--budget: found 0"),

@@ -249,6 +249,20 @@ def test_a_chart_of_one_point_is_not_drawn(tmp_path, capsys):
     assert "nothing to draw: no chart has two points; study.csv has the reasons" in said.err
 
 
+def test_values_are_drawn_where_no_error_is_known(tmp_path, capsys):
+    folder = study_folders.ladder(tmp_path / "unclaimed")
+    rows = list(csv.DictReader((folder / "study.csv").open()))
+    with (folder / "study.csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, rows[0])
+        table.writeheader()
+        table.writerows({**row, "force_error": "", "force_uncertainty": ""} for row in rows)
+    assert main(["plot", str(folder), "--format", "svg"]) == 0
+    assert "values_force.svg" in capsys.readouterr().out
+    drawn = list(csv.DictReader((folder / "charts/values_force.csv").open()))
+    found = {(row["line"], row["edge length [m]"]): row["force [N]"] for row in drawn}
+    assert found == {(row["mesh.element"], row["mesh.size"]): row["force"] for row in rows}
+
+
 def test_runs_that_are_still_to_come_are_not_drawn(ladder):
     path = ladder.folder / "study.csv"
     path.write_text(path.read_text().replace("done,reached", "skipped,not_run", 4))

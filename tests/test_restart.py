@@ -347,7 +347,7 @@ def test_the_command_line_goes_on_from_a_case_or_a_folder(kept, stopped, tmp_pat
     )
     assert case_of_run(tmp_path / "second").spec == kept[1].spec
     assert main(["run", "second", "--restart"]) == 0
-    assert "goes on from checkpoint 2" in capsys.readouterr().out
+    assert "goes on from checkpoint 2, at pseudo-time 0.5\n" in capsys.readouterr().out
     for name in ("run", "second"):
         assert differences(kept[0] / "whole", tmp_path / name) == []
 

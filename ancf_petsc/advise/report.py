@@ -87,6 +87,10 @@ class Advice:
         if self.best is not None:
             found.append(f"take {described(self.best)}")
             found.append(f"  {self.best.command(self.case_file)}")
+        elif self.guess is None:
+            found.append(
+                "nothing can be advised: too few runs came to the end to estimate what errors are against"
+            )
         else:
             found.append(f"nothing that could be tried is within {percent(self.target)} of it")
             if self.nearest is not None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ancf_petsc.advise.question import KEY
 from ancf_petsc.errors import CaseError, writing
 from ancf_petsc.input import toml
 from ancf_petsc.input.load import Case, load_case
@@ -34,7 +35,7 @@ def working_case(case: Case, asked: QuantitySpec, folder: Path) -> tuple[Case, Q
         _cut(data, case, end)
         asked, free = QuantitySpec(column=asked.column, at=OutputAt(END)), True
     else:
-        check_quantity("quantity", asked, case.spec, case.file or folder)
+        _check(asked, case)
     file = folder / "case.toml"
     with writing(folder, "--out"):
         folder.mkdir(parents=True, exist_ok=True)
@@ -42,10 +43,19 @@ def working_case(case: Case, asked: QuantitySpec, folder: Path) -> tuple[Case, Q
     return load_case(file), asked, free
 
 
+def _check(asked: QuantitySpec, case: Case) -> None:
+    """Raise CaseError, in words of the command line, where the case has no such column or output."""
+    try:
+        check_quantity("", asked, case.spec, case.folder)
+    except CaseError as error:
+        raise CaseError(
+            error.problem, key=KEY, got=error.got, expected=error.expected, cure=error.cure
+        ) from error
+
+
 def _pseudo_time(case: Case, asked: QuantitySpec, at: OutputAt) -> float:
     """Where on its path a static case reaches what is asked for. Raises CaseError."""
-    file = case.file or Path("case")
-    check_quantity("quantity", QuantitySpec(column=asked.column, at=OutputAt(END)), case.spec, file)
+    _check(QuantitySpec(column=asked.column, at=OutputAt(END)), case)
     if at.column == END:
         return 1.0
     if at.column == "pseudo_time" and 0.0 < at.value <= 1.0:
@@ -54,12 +64,12 @@ def _pseudo_time(case: Case, asked: QuantitySpec, at: OutputAt) -> float:
         found = _time_of_stroke(case, at.value)
         if found is not None:
             return found
-    check_quantity("quantity", asked, case.spec, file)
+    _check(asked, case)
     times, points = output_times(case.spec), outputs(case.spec, at.column)
     index = None if points is None else nearest(points, at.value)
     if index is None:
         cure = "drive output.curve.stroke, or ask at a pseudo_time"
-        raise CaseError("the path to this stroke is not known", key="--quantity", got=at.value, cure=cure)
+        raise CaseError("the path to this stroke is not known", key=KEY, got=at.value, cure=cure)
     return times[index]
 
 

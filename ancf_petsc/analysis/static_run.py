@@ -80,6 +80,8 @@ class StaticRun:
         """Where it is, in words."""
         if self._path is not None:
             return f"pseudo-time {self._path.s:.6g}"
+        if "path" in self._restored:
+            return f"pseudo-time {self._restored['path']['s']:.6g}"
         return "the way to pseudo-time 0"
 
     def state(self) -> dict[str, Any]:

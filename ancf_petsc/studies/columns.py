@@ -9,7 +9,7 @@ from typing import Any
 from ancf_petsc.axes import AXES
 from ancf_petsc.errors import CaseError, did_you_mean
 from ancf_petsc.input.schema import CaseSpec
-from ancf_petsc.model.ramp import make_ramp
+from ancf_petsc.model.ramp import Ramp, make_ramp
 from ancf_petsc.plan.outputs import motion_times, output_times
 from ancf_petsc.studies.spec import OutputAt, QuantitySpec
 
@@ -82,12 +82,21 @@ def _strokes(spec: CaseSpec, times: Sequence[float] | None, column: str) -> list
     if times is None:
         assert spec.dynamics is not None
         times = [time / spec.dynamics.duration for time in motion_times(spec.dynamics)]
+    driver = _driver(spec)
+    if driver is None:
+        return None
+    move, ramp = driver
+    return [move * ramp.value(s) for s in times]
+
+
+def _driver(spec: CaseSpec) -> tuple[float, Ramp] | None:
+    """Move and ramp of the group whose stroke is recorded; None where nothing drives it, or only the run can tell how far."""
+    curve = spec.output.curve
+    if curve is None or spec.statics is not None and spec.statics.control == "arc_length":
+        return None
     axis: Any = curve.stroke.axis
     drivers = [row for row in spec.constraint if row.group == curve.stroke.group and row.move.get(axis)]
-    if not drivers or spec.statics is not None and spec.statics.control == "arc_length":
-        return None
-    ramp = make_ramp(drivers[0].ramp, "linear")
-    return [drivers[0].move[axis] * ramp.value(s) for s in times]
+    return (drivers[0].move[axis], make_ramp(drivers[0].ramp, "linear")) if drivers else None
 
 
 def nearest(points: Sequence[float], wanted: float) -> int | None:
@@ -119,4 +128,18 @@ def how_to_ask(spec: CaseSpec, at: OutputAt) -> str:
     name = "strokes" if at.column == "stroke" else "times"
     if at.column == "time":
         return "a path of statics has pseudo_time, or stroke"
+    reach = _reach(spec, at.column)
+    if reach is not None and abs(at.value) > reach:
+        return f"the path ends at a {at.column} of {reach:g}: ask for one up to there, or make the case go on to it"
     return f"ask for it by [statics] {name} = [{at.value:g}] in place of steps"
+
+
+def _reach(spec: CaseSpec, column: str) -> float | None:
+    """The largest pseudo-time, or stroke of a driven group, on a static path; None where only the run can tell."""
+    if column == "pseudo_time":
+        return 1.0
+    driver = _driver(spec)
+    if driver is None:
+        return None
+    move, ramp = driver
+    return abs(move) * max((abs(factor) for _, factor in ramp.table), default=1.0)

@@ -155,7 +155,7 @@ class Runner:
         if timed_out:
             process.ask_to_stop()
             process.end(PATIENCE)
-            code, reason = TIMED_OUT, f"stopped after {self.timeout:g} s, the study's timeout"
+            code, reason = TIMED_OUT, f"stopped after {self.timeout:.3g} s, the time a run was given"
         else:
             reason = one_line(process.reason()) if code else ""
             process.end()

@@ -57,16 +57,20 @@ MAKERS = {
 
 
 def charts_wanted(study: StudyTable) -> list[ChartSpec]:
-    """The study's [[chart]] tables; without any, work against precision and convergence of all that has a reference."""
-    if study.charts:
-        return study.charts
-    kinds = ("work_precision", "convergence")
-    return [
-        ChartSpec(kind=kind, quantity=name)  # type: ignore[arg-type]
-        for name in study.quantities
-        if any(row.number(f"{name}_error") >= 0 for row in study.rows)
-        for kind in kinds
-    ]
+    """The study's [[chart]] tables; without any, those that each quantity allows."""
+    return study.charts or [chart for name in study.quantities for chart in _charts_without_spec(study, name)]
+
+
+def _charts_without_spec(study: StudyTable, quantity: str) -> list[ChartSpec]:
+    """Work against precision, and convergence; without errors the values over the last key of numbers, if there is one."""
+    if any(row.number(f"{quantity}_error") >= 0 for row in study.rows):
+        return [ChartSpec(kind=kind, quantity=quantity) for kind in ("work_precision", "convergence")]
+    varied = [key for key in study.keys if len(study.values(key)) > 1]
+    along = [key for key in varied if study.is_numeric(key)]
+    if not along:
+        return []
+    lines = tuple(key for key in varied if key != along[-1])
+    return [ChartSpec(kind="values", quantity=quantity, x=along[-1], lines=lines)]
 
 
 def charts_of(study: StudyTable) -> tuple[list[DrawnChart], list[str]]:
