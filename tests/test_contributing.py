@@ -25,7 +25,7 @@ from ancf_petsc.analysis.build import build
 from ancf_petsc.element import catalog
 from ancf_petsc.element.element import Element
 from ancf_petsc.errors import CaseError
-from ancf_petsc.input import analysis, load, loads, messages, methods, schema
+from ancf_petsc.input import analysis, load, loads, methods, schema
 from ancf_petsc.material import models
 from ancf_petsc.mesh.generate import make_mesh
 from ancf_petsc.plan import loads as plan_loads
@@ -155,8 +155,7 @@ def model_of(folder, element, **tables):
 def change_cases(monkeypatch, **keys):
     """Let cases have other keys than those of the schema."""
     changed = create_model("CaseSpec", __base__=schema.CaseSpec, **keys)
-    for module in (load, messages):
-        monkeypatch.setattr(module, "CaseSpec", changed)
+    monkeypatch.setattr(load, "CaseSpec", changed)
 
 
 def test_a_load_is_a_table_of_keys_and_a_file(project, monkeypatch, tmp_path):

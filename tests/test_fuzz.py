@@ -111,7 +111,7 @@ def test_other_numbers_than_the_second_reader_s_are_a_finding(fuzzing, room, mon
 
 def test_a_small_campaign_finds_nothing(project, tmp_path, environment):
     """Some of every kind, in processes as `scripts/fuzz` has them."""
-    command = [project / "scripts" / "fuzz", "--quick", "--jobs", "2"]
+    command = [sys.executable, project / "scripts" / "fuzz", "--quick", "--jobs", "2"]
     done = subprocess.run(
         command, env=environment | {"TMPDIR": str(tmp_path)}, capture_output=True, text=True
     )
