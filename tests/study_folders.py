@@ -55,7 +55,8 @@ def ladder(folder, charts=(), title="Block: element and mesh"):
             row = {
                 "mesh.element": code, "mesh.size": size, "force": -8860.4 * (1 + error), "force_error": error,
                 "force_uncertainty": 1e-4, "elements": dof // 3, "dof": dof, "h": size,
-                "solve_seconds": 0.02 + 1e-5 * dof * order**2, "total_seconds": 1.0 + 1e-5 * dof * order**2, "run": f"runs/{code}_{size}",
+                "solve_seconds": 0.02 + 1e-5 * dof * order**2, "total_seconds": 1.0 + 1e-5 * dof * order**2,
+                "run": f"runs/{code}_{size}",
                 "seconds_alone": "false" if (code, size) == ("3413", 0.004) else "true",
             }  # fmt: skip
             if (code, size) == ("3443", 0.002):
