@@ -30,7 +30,11 @@ def _put(file: Any, name: str, data: Any, **options: Any) -> None:
     """Another data set under a name, its attributes kept."""
     attributes = dict(file[name].attrs)
     del file[name]
-    made = file.create_dataset(name, data=data, **options)
+    _give(file.create_dataset(name, data=data, **options), attributes)
+
+
+def _give(made: Any, attributes: dict[str, Any]) -> None:
+    """Attributes of another data set, but for the lists that HDF5 keeps itself."""
     for key, value in attributes.items():
         if key not in ("DIMENSION_LIST", "REFERENCE_LIST"):
             made.attrs[key] = value
@@ -147,9 +151,7 @@ def huge_dataset(folder: Path, main: Path, random: Random) -> None:
             made = file.create_dataset(
                 name, shape, dtype=kind, chunks=chunks, compression="gzip" if random.random() < 0.5 else None
             )
-            for key, value in attributes.items():
-                if key not in ("DIMENSION_LIST", "REFERENCE_LIST"):
-                    made.attrs[key] = value
+            _give(made, attributes)
 
 
 def other_attribute(folder: Path, main: Path, random: Random) -> None:
